@@ -148,7 +148,8 @@ class _Drawing:
     def borders(self, control: Control) -> list[Border] | None:
         """Return the borders; None where they leave the faces whose windows are there."""
         control.check_memory(self._nbytes)
-        topology, swept = self._mesh.topology, self._swept
+        embedding, swept = self._mesh.embedding, self._swept
+        topology = embedding.topology
         mixed: Any = np.zeros(len(self.faces), np.bool_)
 
         def mix(first: int, last: int) -> int:
@@ -172,7 +173,7 @@ class _Drawing:
         def trace(first: int, last: int) -> int:
             nonlocal next_node
             found = trace_borders(
-                topology, divided, labelled, near, 0.5 * self._chord_error, first, last, next_node
+                embedding, divided, labelled, near, 0.5 * self._chord_error, first, last, next_node
             )
             parts.append((found.points, *found.chains, found.sources))
             next_node = found.next_node

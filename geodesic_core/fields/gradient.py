@@ -26,7 +26,7 @@ def gradient_at_vertices(mesh: TriangleMesh, winners: Winners, nodes: Nodes) -> 
     reached = np.flatnonzero((via >= 0) & np.isfinite(vertices.distance[: len(gradient)]))
     reached = reached[~_lies_on_curve(mesh, winners, is_parallel)[reached]]
     via = via[reached]
-    geometry, positions = topology.geometry[via], topology.positions
+    geometry, positions = topology.geometry[via], mesh.positions
     tail, head, apex = (positions[topology.links[via, k]] for k in (TAIL, HEAD, APEX))
     reach = geometry[:, LENGTH_LEFT]
     at_apex = np.column_stack([geometry[:, COS_LEFT] * reach, geometry[:, SIN_LEFT] * reach])

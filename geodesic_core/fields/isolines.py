@@ -226,7 +226,8 @@ class Drawing:
         Cancelled, DeadlineExceeded, MemoryLimitExceeded
             As the control says; what the lines are drawn from counts as memory of the call.
         """
-        topology, distances = self._mesh.topology, self._swept.distance
+        embedding, distances = self._mesh.embedding, self._swept.distance
+        topology = embedding.topology
         slack = LEVEL * level
         passed = np.flatnonzero((self._least <= level + slack) & (self._most >= level - slack))
         if len(passed) == 0:
@@ -241,7 +242,7 @@ class Drawing:
 
         def chain(first: int, last: int) -> int:
             points, chains = chain_arcs(
-                topology, distances, cuts, crossings, level, 0.5 * chord_error, first, last
+                embedding, distances, cuts, crossings, level, 0.5 * chord_error, first, last
             )
             parts.append((points, *chains))
             control.check_memory(bytes_of(parts))

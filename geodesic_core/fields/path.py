@@ -273,7 +273,7 @@ def located_path(
     weights, points = np.empty((count, 3)), np.empty((count, 3))
     nodes, parameters = nodes[::-1].copy(), parameters[::-1].copy()
     located = Locations(faces, weights, vertices, points)
-    locations.locate_nodes(mesh.topology, mesh.faces, nodes, parameters, located)
+    locations.locate_nodes(mesh.embedding, mesh.faces, nodes, parameters, located)
     for i in (count - 1, 0):
         node = -1 - int(nodes[i])
         if node < len(mesh.vertices):

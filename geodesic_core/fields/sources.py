@@ -343,5 +343,5 @@ def corners_of(mesh: TriangleMesh, point: SurfacePoint) -> tuple[Ints, Floats]:
     if point.vertex_index is not None:
         return inner[[point.vertex_index]], np.zeros(1)
     corners = inner[mesh.faces[point.face_index]]
-    away = mesh.topology.positions[corners] - mesh.position_from_origin(point)
+    away = mesh.positions[corners] - mesh.position_from_origin(point)
     return corners, np.linalg.norm(away, axis=1)

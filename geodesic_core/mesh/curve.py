@@ -142,7 +142,7 @@ def foot_on(mesh: TriangleMesh, segment: SegmentInFace, position: Floats) -> Sur
     """Return the canonical point of a segment that is nearest to a position, from the origin."""
     inner = mesh.topology.links[3 * segment.face : 3 * segment.face + 3, TAIL]
     start, end = (
-        (np.array(weights)[:, None] * mesh.topology.positions[inner]).sum(axis=0)
+        (np.array(weights)[:, None] * mesh.positions[inner]).sum(axis=0)
         for weights in (segment.start, segment.end)
     )
     along = end - start

@@ -16,7 +16,7 @@ from geodesic_core.kernels.mesh.half_edges import (
     SADDLE,
     SEAM,
     SIN_LEFT,
-    Topology,
+    Embedding,
 )
 from geodesic_core.mesh.degeneracies import (
     edges_of_no_length,
@@ -165,9 +165,10 @@ def edges_of(faces: Ints) -> tuple[Ints, Ints, NDArray[np.bool_]]:
 
 
 def report_of(
-    vertices: Floats, faces: Ints, face_map: Longs | None, topology: Topology
+    vertices: Floats, faces: Ints, face_map: Longs | None, embedding: Embedding
 ) -> MeshReport:
     """Return the report of a mesh; O(V log V + F log F)."""
+    topology = embedding.topology
     inner = topology.inner_vertex
     lowest_joined = topology.outer_vertex[inner]
     is_used = (np.diff(topology.first_corner) > 0)[inner]
@@ -183,7 +184,7 @@ def report_of(
     edges, edge_faces, same_way = edges_of(corners)
     lengths = np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1)
     first_used = used[first_equal(vertices[used])]
-    seams = seams_of(topology, used, first_used)
+    seams = seams_of(embedding, used, first_used)
     lowest = used[np.unique(topology.component[used], return_index=True)[1]]
     polygons = np.zeros(0) if face_map is None else np.bincount(face_map)
     return MeshReport(

@@ -15,6 +15,7 @@ from geodesic_core.kernels.mesh.half_edges import (
     OPPOSITE,
     SIN_RIGHT,
     TAIL,
+    Embedding,
     Topology,
 )
 from geodesic_core.kernels.mesh.point_tree import find_nearest, find_on_edges, tree_of
@@ -34,12 +35,13 @@ class Seams(NamedTuple):
     """(J, 2): the edge of each, the lower vertex first"""
 
 
-def seams_of(topology: Topology, used: Longs, first: Longs) -> Seams:
+def seams_of(embedding: Embedding, used: Longs, first: Longs) -> Seams:
     """Return the open seams of a mesh; O(B log B) for B border vertices in practice.
 
     ``used`` are the vertices of the surface, ascending, and ``first`` the first one at the position
     of each. Those at one position count as one here: they are told as duplicates.
     """
+    topology, positions = embedding
     links = topology.links
     border = np.flatnonzero(links[:, OPPOSITE] == NO_FACE)
     if len(border) == 0:
@@ -49,13 +51,13 @@ def seams_of(topology: Topology, used: Longs, first: Longs) -> Seams:
     outer_ends: Longs = topology.outer_vertex[ends].astype(np.int64)
 
     # Of the border vertices at one position, the lowest stands for all: a place of the tree.
-    is_border = np.zeros(len(topology.positions), bool)
+    is_border = np.zeros(len(positions), bool)
     is_border[outer_ends] = True
     vertices, at = used[is_border[used]], first[is_border[used]]
     lowest = np.empty_like(is_border, np.int64)
     lowest[at[::-1]] = vertices[::-1]
     places = vertices[lowest[at] == vertices]
-    tree = tree_of(topology.positions[topology.inner_vertex[places]])
+    tree = tree_of(positions[topology.inner_vertex[places]])
     places = places[tree.order]
     place_of = np.full_like(lowest, -1)
     place_of[places] = np.arange(len(places))

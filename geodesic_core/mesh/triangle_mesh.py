@@ -12,7 +12,7 @@ from geodesic_core import plotting
 from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.errors import InvalidArgument, InvalidMesh, InvalidPoint
 from geodesic_core.kernels.mesh import build
-from geodesic_core.kernels.mesh.half_edges import TAIL, Topology
+from geodesic_core.kernels.mesh.half_edges import TAIL, Embedding, Topology
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.mesh import canonical
 from geodesic_core.mesh.closest_point import NearestFace
@@ -99,8 +99,8 @@ class TriangleMesh:
     """(given vertices,) int64: the vertex that each given one became; None where none moved."""
     face_map: Longs | None
     """(F,) int64: the polygon that each face came from; None where each polygon is one face."""
-    topology: Topology
-    """Half-edges and flat geometry, see `geodesic_core.kernels.mesh.half_edges`."""
+    embedding: Embedding
+    """Half-edges and positions, see `geodesic_core.kernels.mesh.half_edges`."""
     _notes: tuple[str, ...]
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike, merge: Merge = "none") -> None:
@@ -176,8 +176,8 @@ class TriangleMesh:
             points, vertex_map = merged(points, _merging_distance(merge))
             triangles = vertex_map[triangles]
         faces = triangles.astype(np.int32)
-        topology = _prepare(points - build.origin_of(points, faces), faces, np.arange(len(faces)))
-        self._hold(points, faces, vertex_map, face_map, topology, notes)
+        embedding = _prepare(points - build.origin_of(points, faces), faces, np.arange(len(faces)))
+        self._hold(points, faces, vertex_map, face_map, embedding, notes)
 
     def _hold(
         self,
@@ -185,7 +185,7 @@ class TriangleMesh:
         faces: Ints,
         vertex_map: Longs | None,
         face_map: Longs | None,
-        topology: Topology,
+        embedding: Embedding,
         notes: Sequence[str] = (),
     ) -> None:
         self.__dict__.update(
@@ -193,7 +193,7 @@ class TriangleMesh:
             faces=_frozen(faces),
             vertex_map=None if vertex_map is None else _frozen(vertex_map),
             face_map=None if face_map is None else _frozen(face_map),
-            topology=Topology(*(_frozen(array) for array in topology)),
+            embedding=_frozen_embedding(embedding),
             _notes=tuple(notes),
         )
 
@@ -231,7 +231,9 @@ class TriangleMesh:
             arrays["faces"],
             arrays.get("vertex_map"),
             arrays.get("face_map"),
-            Topology(**{name: arrays[name] for name in Topology._fields}),
+            Embedding(
+                Topology(**{name: arrays[name] for name in Topology._fields}), arrays["positions"]
+            ),
         )
         return mesh
 
@@ -256,7 +258,7 @@ class TriangleMesh:
             arrays["vertex_map"] = self.vertex_map
         if self.face_map is not None:
             arrays["face_map"] = self.face_map
-        return arrays | self.topology._asdict()
+        return arrays | {"positions": self.positions} | self.topology._asdict()
 
     def with_barriers(self, barriers: Iterable[int]) -> "TriangleMesh":
         """Return this mesh with some faces blocked, as holes; paths may bend at their corners.
@@ -302,9 +304,21 @@ class TriangleMesh:
         if (self.inner_face[free] < 0).all():
             raise InvalidArgument("the barriers block every face: there is no surface left")
         mesh = TriangleMesh.__new__(TriangleMesh)
-        topology = _prepare(self.vertices - self.origin, self.faces, free)
-        mesh._hold(self.vertices, self.faces, self.vertex_map, self.face_map, topology, self._notes)
+        embedding = _prepare(self.vertices - self.origin, self.faces, free)
+        mesh._hold(
+            self.vertices, self.faces, self.vertex_map, self.face_map, embedding, self._notes
+        )
         return mesh
+
+    @property
+    def topology(self) -> Topology:
+        """Half-edges and lengths: the surface as sweeps know it, wherever it lies in space."""
+        return self.embedding.topology
+
+    @property
+    def positions(self) -> Floats:
+        """(V, 3) float64: the topology's vertices, mesh units from `origin`."""
+        return self.embedding.positions
 
     @cached_property
     def barriers(self) -> Longs:
@@ -346,9 +360,9 @@ class TriangleMesh:
 
     @cached_property
     def origin(self) -> Floats:
-        """(3,) mesh units: what the topology's positions are measured from (`build.origin_of`)."""
+        """(3,) mesh units: what `positions` are measured from (`build.origin_of`)."""
         v = self.topology.links[0, TAIL]  # a vertex of the surface: both differences are exact
-        origin: Floats = self.vertices[self.topology.outer_vertex[v]] - self.topology.positions[v]
+        origin: Floats = self.vertices[self.topology.outer_vertex[v]] - self.positions[v]
         return origin
 
     @cached_property
@@ -588,7 +602,7 @@ class TriangleMesh:
     @cached_property
     def report(self) -> MeshReport:
         """Counts and defects; O(V log V + F log F), computed once."""
-        return report_of(self.vertices, self.faces, self.face_map, self.topology)
+        return report_of(self.vertices, self.faces, self.face_map, self.embedding)
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
@@ -603,7 +617,7 @@ class TriangleMesh:
         """Become a copy; pickle and `copy` forget that arrays are read-only."""
         for name, value in state.items():
             self.__dict__[name] = _frozen(value) if isinstance(value, np.ndarray) else value
-        self.__dict__["topology"] = Topology(*(_frozen(array) for array in self.topology))
+        self.__dict__["embedding"] = _frozen_embedding(self.embedding)
 
     def to_trimesh(self) -> Any:
         """Return the mesh as one of trimesh, with the same numbers of vertices and faces.
@@ -677,28 +691,34 @@ def _frozen(array: NDArray[Any]) -> NDArray[Any]:
     return frozen
 
 
-def _prepare(vertices: Floats, faces: Ints, free: Longs) -> Topology:
-    """Return the topology of the faces that are not blocked; ``vertices`` less the origin."""
-    topology, outcome, bad = _built(vertices, faces, free)
+def _frozen_embedding(embedding: Embedding) -> Embedding:
+    topology = Topology(*(_frozen(array) for array in embedding.topology))
+    return Embedding(topology, _frozen(embedding.positions))
+
+
+def _prepare(vertices: Floats, faces: Ints, free: Longs) -> Embedding:
+    """Return the surface of the faces that are not blocked; ``vertices`` less the origin."""
+    embedding, outcome, bad = _built(vertices, faces, free)
     if outcome == Outcome.TOO_SHORT:
         joined = lowest_joined(len(vertices), edges_of_no_length(vertices, faces[free]))
-        topology, outcome, bad = _built(vertices, joined[faces].astype(np.int32), free)
+        embedding, outcome, bad = _built(vertices, joined[faces].astype(np.int32), free)
+        topology = embedding.topology
         topology.inner_vertex[:] = topology.inner_vertex[joined]
         # Renumbered without the components of vertices that joined others.
         topology.component[:] = np.unique(topology.component[joined], return_inverse=True)[1]
     if outcome == Outcome.TOO_SHORT:
-        face = int(topology.outer_face[bad])
+        face = int(embedding.topology.outer_face[bad])
         raise InvalidMesh(
             f"face {face} is {faces[face].tolist()} and has an edge shorter than "
             f"{SHORTEST_EDGE:g}: scale the mesh, or merge the edge's vertices",
             kind="face",
             elements=[face],
         )
-    return topology
+    return embedding
 
 
-def _built(vertices: Floats, faces: Ints, free: Longs) -> tuple[Topology, int, int]:
-    """Return the topology of those faces that have three different vertices, and the outcome."""
+def _built(vertices: Floats, faces: Ints, free: Longs) -> tuple[Embedding, int, int]:
+    """Return the surface of those faces that have three different vertices, and the outcome."""
     surface = free[of_three_vertices(faces.take(free, axis=0))]  # take: four times as fast as []
     if len(surface) == 0:
         raise InvalidMesh(
@@ -706,7 +726,8 @@ def _built(vertices: Floats, faces: Ints, free: Longs) -> tuple[Topology, int, i
             kind="face",
             elements=free[:NAMED].tolist(),
         )
-    topology = build.empty_topology(len(vertices), len(surface))
-    outcome, bad = build.build_topology(vertices, faces.take(surface, axis=0), topology)
-    topology.outer_face[:] = surface[topology.outer_face]
-    return topology, outcome, bad
+    embedding = build.empty_embedding(len(vertices), len(surface))
+    outcome, bad = build.build_topology(vertices, faces.take(surface, axis=0), embedding)
+    outer_face = embedding.topology.outer_face
+    outer_face[:] = surface[outer_face]
+    return embedding, outcome, bad

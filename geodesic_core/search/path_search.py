@@ -185,7 +185,7 @@ class PathSearch:
         topology, wave = self.mesh.topology, self._outward
         first, last = leg.start.nearest_corner, leg.end.nearest_corner
         beside = float(leg.start.reaches.min() + leg.end.reaches.min())
-        corner = topology.positions[first].copy(), np.array([first], np.int32), np.zeros(1)
+        corner = self.mesh.positions[first].copy(), np.array([first], np.int32), np.zeros(1)
         bounds = exact_bounds(math.inf, self._landmarks.pruning_through(*corner, math.inf))
         edge_dijkstra.search_edges(topology, wave, bounds, last, first)
         self._touched += int(wave.counters[TOUCHED])

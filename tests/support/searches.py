@@ -89,7 +89,7 @@ def goal_at_vertex(
     **known: object,
 ) -> PruningBounds:
     """The bounds of paths through inner vertex v."""
-    here = mesh.topology.positions[v].copy(), np.array([v], np.int32), np.zeros(1)
+    here = mesh.positions[v].copy(), np.array([v], np.int32), np.zeros(1)
     return (landmarks or Landmarks(mesh)).pruning_through(*here, limit)._replace(**known)
 
 

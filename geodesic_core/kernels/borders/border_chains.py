@@ -51,7 +51,7 @@ class TracedBorders(NamedTuple):
 
 @kernel
 def trace_bisector(
-    topology: Any, face: int, curve: Floats, error: float, points: Floats, count: int
+    embedding: Any, face: int, curve: Floats, error: float, points: Floats, count: int
 ) -> Any:
     """Append the points inside a bisector to ``points``, but for its ends; return both.
 
@@ -72,7 +72,7 @@ def trace_bisector(
         if top > 0:
             x, y = point_on(curve, end)
             points = with_room(points, count + 1)
-            put_in_face(topology, face, x, y, points, count)
+            put_in_face(embedding, face, x, y, points, count)
             count += 1
         start, top = end, top - 1
     return points, count
@@ -80,7 +80,7 @@ def trace_bisector(
 
 @kernel
 def trace_borders(
-    topology: Any, territories: Any, labelled: Any, near: float, chord_error: float, first: int,
+    embedding: Any, territories: Any, labelled: Any, near: float, chord_error: float, first: int,
     last: int, next_node: int,
 ) -> TracedBorders:  # fmt: skip
     """Trace the borders of two sources in each of the faces from row ``first`` up to ``last``.
@@ -88,7 +88,8 @@ def trace_borders(
     Nodes in faces have numbers from ``next_node`` on. Ends nearer than ``near``, mesh units, are
     one. O(n³) for n bisectors in a face.
     """
-    topology, territories, labelled = borrowed(topology), borrowed(territories), borrowed(labelled)
+    embedding, territories = borrowed(embedding), borrowed(territories)
+    topology, labelled = embedding.topology, borrowed(labelled)
     points, count = np.empty((4 * ROWS, 3)), 0
     chains, sources, chain_count = room_for_chains(ROWS), np.empty((ROWS, 2), np.int32), 0
     for k in range(first, last):
@@ -100,12 +101,12 @@ def trace_borders(
             if min(left, right) < 0:
                 continue
             begin = count
-            points, count = put_node(topology, labelled, face, own, u, points, count)
+            points, count = put_node(embedding, labelled, face, own, u, points, count)
             if i < len(curves):
                 points, count = trace_bisector(
-                    topology, face, curves[i], chord_error, points, count
+                    embedding, face, curves[i], chord_error, points, count
                 )
-            points, count = put_node(topology, labelled, face, own, v, points, count)
+            points, count = put_node(embedding, labelled, face, own, v, points, count)
             chains = with_chain(
                 chains, chain_count, count - begin, face,
                 global_node(own, u, next_node), global_node(own, v, next_node),
@@ -167,12 +168,18 @@ def global_node(nodes: FaceNodes, node: int, next_node: int) -> int:
 
 @kernel
 def put_node(
-    topology: Any, labelled: Any, face: int, nodes: FaceNodes, node: int, points: Floats, count: int
+    embedding: Any,
+    labelled: Any,
+    face: int,
+    nodes: FaceNodes,
+    node: int,
+    points: Floats,
+    count: int,
 ) -> Any:
     """Append the point of a node of a face to ``points``; return them and their number."""
     nodes, crossing = borrowed(nodes), crossing_of(nodes, node)
     if crossing >= 0:
-        return put_crossing(topology, labelled.crossings, crossing, points, count)
+        return put_crossing(embedding, labelled.crossings, crossing, points, count)
     points = with_room(points, count + 1)
-    put_in_face(topology, face, nodes.places[node, 0], nodes.places[node, 1], points, count)
+    put_in_face(embedding, face, nodes.places[node, 0], nodes.places[node, 1], points, count)
     return points, count + 1

@@ -152,9 +152,10 @@ def crossings_around(geometry: Floats, crossings: Any, face: int, row: int) -> F
 
 
 @inlined
-def put_in_face(topology: Any, face: int, x: float, y: float, points: Floats, row: int) -> None:
+def put_in_face(embedding: Any, face: int, x: float, y: float, points: Floats, row: int) -> None:
     """Write the point of a face at (x, y) in its frame, pulled into the face, to a row."""
-    links, geometry, positions = topology.links, topology.geometry, topology.positions
+    links, geometry = embedding.topology.links, embedding.topology.geometry
+    positions = embedding.positions
     h = 3 * face
     tail, head, apex = links[h, TAIL], links[h, HEAD], links[h + 1, HEAD]
     ax = geometry[h, LENGTH_LEFT] * geometry[h, COS_LEFT]
@@ -168,13 +169,13 @@ def put_in_face(topology: Any, face: int, x: float, y: float, points: Floats, ro
 
 
 @kernel
-def put_crossing(topology: Any, crossings: Any, c: int, points: Floats, count: int) -> Any:
+def put_crossing(embedding: Any, crossings: Any, c: int, points: Floats, count: int) -> Any:
     """Append the point of a crossing to ``points``: the same to the bit for all faces.
 
     Returns the points, which may be in a larger array, and their number.
     """
-    links, positions, h = topology.links, topology.positions, crossings.half_edges[c]
-    share = crossings.positions[c] / topology.geometry[h, LENGTH]
+    links, positions, h = embedding.topology.links, embedding.positions, crossings.half_edges[c]
+    share = crossings.positions[c] / embedding.topology.geometry[h, LENGTH]
     points = with_room(points, count + 1)
     for axis in range(3):
         start, end = positions[links[h, TAIL], axis], positions[links[h, HEAD], axis]

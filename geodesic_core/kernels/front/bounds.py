@@ -17,6 +17,8 @@ class PruningBounds(NamedTuple):
     been before, from its values, up to the ceiling within which it pruned nothing.
     """
 
+    positions: Floats
+    """(V, 3): of the vertices"""
     position: Floats
     """(3,): of the start"""
     limit: float
@@ -35,10 +37,15 @@ class PruningBounds(NamedTuple):
 
 
 def pruning_toward(
-    position: Floats, limit: float, known: Floats | None = None, ceiling: float = math.inf
+    positions: Floats,
+    position: Floats,
+    limit: float,
+    known: Floats | None = None,
+    ceiling: float = math.inf,
 ) -> PruningBounds:
     """Return the bounds of paths to a position, of which no landmarks are known."""
     return PruningBounds(
+        positions=positions,
         position=position,
         limit=limit,
         landmarks=np.empty((0, LANDMARKS), np.float32),
@@ -50,7 +57,7 @@ def pruning_toward(
     )
 
 
-NO_PRUNING = pruning_toward(np.zeros(3), math.inf)
+NO_PRUNING = pruning_toward(np.empty((0, 3)), np.zeros(3), math.inf)
 """The bounds of a sweep that is not pruned."""
 
 ABSENT_PRUNING = PruningBounds(*[ABSENT] * len(PruningBounds._fields))

@@ -72,10 +72,10 @@ def lower_bound_to_target(wave: View, v: int) -> float:
 @inlined
 def straight_to_start(wave: View, v: int) -> float:
     """Euclidean distance from v to the start."""
-    mesh = wave.mesh
-    x = mesh.positions[3 * v] - wave.bounds.pruning.position[0]
-    y = mesh.positions[3 * v + 1] - wave.bounds.pruning.position[1]
-    z = mesh.positions[3 * v + 2] - wave.bounds.pruning.position[2]
+    positions, start = wave.bounds.pruning.positions, wave.bounds.pruning.position
+    x = positions[3 * v] - start[0]
+    y = positions[3 * v + 1] - start[1]
+    z = positions[3 * v + 2] - start[2]
     return math.sqrt(x * x + y * y + z * z)
 
 

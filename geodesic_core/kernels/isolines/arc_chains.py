@@ -59,7 +59,7 @@ def step_of(radius: float, chord_error: float) -> float:
 
 @kernel
 def trace_arc(
-    topology: Any, face: int, arc: Floats, error: float, points: Floats, count: int
+    embedding: Any, face: int, arc: Floats, error: float, points: Floats, count: int
 ) -> Any:
     """Append an arc's points to ``points``, both ends included; return them and their number."""
     width, chords = arc[END] - arc[START], 1
@@ -68,19 +68,20 @@ def trace_arc(
     points = with_room(points, count + chords + 1)
     for i in range(chords + 1):
         x, y = point_on(arc, arc[START] + width * (i / chords))
-        put_in_face(topology, face, x, y, points, count + i)
+        put_in_face(embedding, face, x, y, points, count + i)
     return points, count + chords + 1
 
 
 @kernel
 def chain_arcs(
-    topology: Any, distance: Floats, cuts: Any, crossings: Any, level: float, chord_error: float,
+    embedding: Any, distance: Floats, cuts: Any, crossings: Any, level: float, chord_error: float,
     first: int, last: int,
 ) -> tuple[Floats, ChainRows]:  # fmt: skip
     """Join the arcs of each of the cut faces from row ``first`` up to ``last`` to chains.
 
     Returns the points of all chains, and the chains. O(n²) for n arcs in a face.
     """
+    topology = embedding.topology
     points, count = np.empty((4 * ROWS, 3)), 0
     chains, chain_count = room_for_chains(ROWS), 0
     for k in range(first, last):
@@ -90,13 +91,13 @@ def chain_arcs(
         joined, done = join(ends.places, starts.places), np.zeros(len(arcs), np.uint8)
         for e in range(len(arcs), len(joined)):  # chains that come in over an edge
             begin, u, s = count, ends.ids[e], joined[e]
-            points, count = put_crossing(topology, crossings, u, points, count)
+            points, count = put_crossing(embedding, crossings, u, points, count)
             while s < len(arcs):
-                points, count = trace_arc(topology, face, arcs[s], chord_error, points, count)
+                points, count = trace_arc(embedding, face, arcs[s], chord_error, points, count)
                 done[s] = 1
                 s = joined[s]
             v = starts.ids[s]
-            points, count = put_crossing(topology, crossings, v, points, count)
+            points, count = put_crossing(embedding, crossings, v, points, count)
             chains = with_chain(chains, chain_count, count - begin, face, u, v)
             chain_count += 1
         for i in range(len(arcs)):  # chains that are closed within the face
@@ -104,7 +105,7 @@ def chain_arcs(
                 continue
             begin, s = count, i
             while not done[s]:
-                points, count = trace_arc(topology, face, arcs[s], chord_error, points, count)
+                points, count = trace_arc(embedding, face, arcs[s], chord_error, points, count)
                 done[s] = 1
                 s = joined[s]
             points = with_room(points, count + 1)

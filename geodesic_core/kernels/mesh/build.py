@@ -36,6 +36,7 @@ from geodesic_core.kernels.mesh.half_edges import (
     SIN_RIGHT,
     SPARE,
     TAIL,
+    Embedding,
     Topology,
     following,
     previous,
@@ -468,19 +469,20 @@ def count_edges(links: Ints) -> int:
 
 
 @kernel
-def build_topology(vertices: Floats, faces: Ints, topology: Any) -> tuple[Outcome, int]:
-    """Fill the arrays of ``topology`` in O(V + F); return (outcome, inner face at fault)."""
+def build_topology(vertices: Floats, faces: Ints, embedding: Any) -> tuple[Outcome, int]:
+    """Fill the arrays of ``embedding`` in O(V + F); return (outcome, inner face at fault)."""
+    topology, positions = embedding
     inner_faces = renumber(
         vertices,
         faces,
         topology.inner_vertex,
         topology.outer_vertex,
         topology.outer_face,
-        topology.positions,
+        positions,
     )
     opposite, around = link_opposites(inner_faces, len(vertices))
     angles, pinched = np.empty(len(opposite)), np.zeros(len(inner_faces), np.uint8)
-    face = fill_geometry(topology.positions, inner_faces, topology.geometry, angles, pinched)
+    face = fill_geometry(positions, inner_faces, topology.geometry, angles, pinched)
     if face >= 0:
         return Outcome.TOO_SHORT, face
     unfold_fans(inner_faces, opposite, angles, pinched, topology)
@@ -490,10 +492,9 @@ def build_topology(vertices: Floats, faces: Ints, topology: Any) -> tuple[Outcom
     return Outcome.FINISHED, -1
 
 
-def empty_topology(vertex_count: int, face_count: int) -> Topology:
+def empty_embedding(vertex_count: int, face_count: int) -> Embedding:
     """Allocate the arrays that `build_topology` fills."""
-    return Topology(
-        positions=np.empty((vertex_count, 3)),
+    topology = Topology(
         geometry=aligned_rows(3 * face_count, ROW, np.float64),
         links=aligned_rows(3 * face_count, ROW, np.int32),
         first_corner=np.empty(vertex_count + 1, np.int32),
@@ -506,3 +507,4 @@ def empty_topology(vertex_count: int, face_count: int) -> Topology:
         outer_vertex=np.empty(vertex_count, np.int32),
         outer_face=np.empty(face_count, np.int32),
     )
+    return Embedding(topology, np.empty((vertex_count, 3)))

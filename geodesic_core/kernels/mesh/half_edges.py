@@ -63,10 +63,12 @@ PINCHED = 16  # the vertex is a corner of a pinched face
 
 
 class Topology(NamedTuple):
-    """Connectivity and flat geometry of a mesh, in inner numbering; read-only once built."""
+    """Connectivity and lengths of a surface, in inner numbering; read-only once built.
 
-    positions: Floats
-    """(V, 3): the vertices, mesh units from the mesh's origin"""
+    All that sweeps and backtracing need: they know nothing of space. Both are one, as links depend
+    on lengths: an edge of no length joins its ends, and a pinched face is crossed in another way.
+    """
+
     geometry: Floats
     """(3F, 8): LENGTH … APEX_ANGLE"""
     links: Ints
@@ -90,6 +92,14 @@ class Topology(NamedTuple):
     are in no face"""
     outer_face: Ints
     """(F,): inner face → the caller's"""
+
+
+class Embedding(NamedTuple):
+    """A surface in space, for what places points there."""
+
+    topology: Topology
+    positions: Floats
+    """(V, 3): the inner vertices, mesh units from the mesh's origin"""
 
 
 @kernel

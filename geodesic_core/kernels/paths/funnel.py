@@ -67,7 +67,7 @@ def shortened_part(topology: Topology, path: Ints, sides: Any) -> float:
     length = math.inf
     for _ in range(PASSES):
         if size == 0:  # the path is an edge
-            return min(length, straight(topology, path[0], path[-1]))
+            return min(length, edge_length(topology, path[0], path[-1]))
         unfold_strip(topology, strip, size, ends)
         taut, count = pull_taut(ends, size, bends, bend_sides, turns)
         if taut >= length * (1.0 - STRAIGHT):
@@ -81,13 +81,12 @@ def shortened_part(topology: Topology, path: Ints, sides: Any) -> float:
 
 
 @kernel
-def straight(topology: Topology, v: int, u: int) -> float:
-    """Euclidean distance of two vertices."""
-    square = 0.0
-    for axis in range(3):
-        step = topology.positions[v, axis] - topology.positions[u, axis]
-        square += step * step
-    return math.sqrt(square)
+def edge_length(topology: Topology, v: int, u: int) -> float:
+    """Length of the edge between two neighbours, mesh units."""
+    h = corner_toward(topology, v, u, HEAD)
+    if h >= 0:
+        return float(topology.geometry[h, LENGTH])
+    return float(topology.geometry[corner_toward(topology, v, u, APEX), LENGTH_LEFT])
 
 
 @inlined

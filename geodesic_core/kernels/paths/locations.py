@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.kernels.jit import inlined, kernel
-from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL, Topology, next_around
+from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL, Embedding, Topology, next_around
 
 
 class Locations(NamedTuple):
@@ -22,12 +22,13 @@ class Locations(NamedTuple):
 
 @kernel
 def locate_nodes(
-    topology: Topology, faces: Ints, nodes: Ints, parameters: Floats, locations: Locations
+    embedding: Embedding, faces: Ints, nodes: Ints, parameters: Floats, locations: Locations
 ) -> None:
     """Fill ``locations`` with the points of nodes as `backtracing.trace_path` has them.
 
     ``faces`` are the caller's. Sites are skipped, but for their weights, which become 0.
     """
+    topology = embedding.topology
     for i in range(len(nodes)):
         v, t = -1 - nodes[i], parameters[i]
         if v < 0 and (t == 0.0 or 1.0 - t == 0.0 or 1.0 - t == 1.0):
@@ -36,14 +37,15 @@ def locate_nodes(
         for k in range(3):
             locations.weights[i, k] = 0.0
         if v < 0:
-            locate_on_edge(topology, faces, nodes[i], t, locations, i)
+            locate_on_edge(embedding, faces, nodes[i], t, locations, i)
         elif v < len(topology.total_angle):
-            locate_vertex(topology, faces, v, locations, i)
+            locate_vertex(embedding, faces, v, locations, i)
 
 
 @inlined
-def locate_vertex(topology: Topology, faces: Ints, v: int, locations: Locations, i: int) -> None:
+def locate_vertex(embedding: Embedding, faces: Ints, v: int, locations: Locations, i: int) -> None:
     """Fill row i of ``locations``, whose weights are 0, with inner vertex v."""
+    topology, positions = embedding
     lowest = -1
     for c in range(topology.first_corner[v], topology.first_corner[v + 1]):
         face = topology.outer_face[topology.corners[c] // 3]
@@ -53,15 +55,16 @@ def locate_vertex(topology: Topology, faces: Ints, v: int, locations: Locations,
     corner = corner_of(topology, faces, lowest, v) if lowest >= 0 else 0
     locations.weights[i, corner] = 1.0
     for axis in range(3):
-        locations.points[i, axis] = topology.positions[v, axis]
+        locations.points[i, axis] = positions[v, axis]
 
 
 @inlined
 def locate_on_edge(
-    topology: Topology, faces: Ints, h: int, t: float, locations: Locations, i: int
+    embedding: Embedding, faces: Ints, h: int, t: float, locations: Locations, i: int
 ) -> None:
     """Fill row i of ``locations``, whose weights are 0, with the point at share t along h."""
-    links, positions, outer_face = topology.links, topology.positions, topology.outer_face
+    topology, positions = embedding
+    links, outer_face = topology.links, topology.outer_face
     u, w = links[h, TAIL], links[h, HEAD]
     lowest, g = outer_face[h // 3], next_around(links, h)
     while g >= 0 and g != h:

@@ -117,7 +117,7 @@ def lines_of_values(mesh: gc.TriangleMesh, values: np.ndarray, level: float):
         paired = put_crossings(around, is_nearer, ends, starts, 0)
         for i, j in enumerate(join(ends.places[:paired], starts.places[:paired])):
             for node in (ends.ids[i], starts.ids[j]):
-                points, count = put_crossing(topology, crossings, node, points, count)
+                points, count = put_crossing(mesh.embedding, crossings, node, points, count)
             chains = with_chain(chains, size, 2, face, ends.ids[i], starts.ids[j])
             size += 1
     first = np.arange(0, count + 1, 2)
@@ -128,7 +128,7 @@ def lines_of_values(mesh: gc.TriangleMesh, values: np.ndarray, level: float):
 def test_crossings_alone_are_joined_to_the_level_set_of_any_values():
     """On a square: a straight line across, and a closed one around its middle."""
     mesh = gc.samples.plane(200)
-    positions = mesh.topology.positions
+    positions = mesh.positions
     lines = lines_of_values(mesh, positions[:, 0] + 0.3 * positions[:, 1], 0.42)
     assert lines.closed.tolist() == [0]
     assert (lines.faces[:-1] >= 0).all()

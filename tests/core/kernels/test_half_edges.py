@@ -11,7 +11,7 @@ import pytest
 import geodesic_core as gc
 from geodesic_core.kernels.mesh.build import (
     count_boundary_loops,
-    empty_topology,
+    empty_embedding,
     fill_geometry,
     fill_links,
     link_around,
@@ -223,7 +223,7 @@ def test_boundary_loops(name, loops):
 
 def topology_as_given(case) -> Topology:
     """Built without renumbering, from the same parts."""
-    topology = empty_topology(len(case.vertices), len(case.faces))
+    topology = empty_embedding(len(case.vertices), len(case.faces)).topology
     faces = np.ascontiguousarray(case.faces, np.int32)
     opposite, around = link_opposites(faces, len(case.vertices))
     angles, pinched = np.empty(faces.size), np.zeros(len(faces), np.uint8)

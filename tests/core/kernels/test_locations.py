@@ -19,7 +19,7 @@ def located_points(mesh, nodes, parameters):
     weights, points = np.empty((count, 3)), np.empty((count, 3))
     nodes, parameters = np.asarray(nodes, np.int32), np.asarray(parameters, float)
     located = Locations(faces, weights, vertices, points)
-    locate_nodes(mesh.topology, mesh.faces, nodes, parameters, located)
+    locate_nodes(mesh.embedding, mesh.faces, nodes, parameters, located)
     return faces, weights, vertices, points
 
 

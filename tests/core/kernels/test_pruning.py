@@ -72,7 +72,7 @@ def test_the_rest_is_never_bounded_above_the_distance(case, count):
     for start in spread(case, 3 if WITHOUT_JIT else 20):
         view = view_toward(mesh, landmarks, start)
         connected = np.flatnonzero(np.isfinite(matrix[start]))
-        straight = np.linalg.norm(mesh.topology.positions - mesh.topology.positions[start], axis=1)
+        straight = np.linalg.norm(mesh.positions - mesh.positions[start], axis=1)
         for v in connected.tolist():
             bound = lower_bound_to_target(view, v)
             assert straight[v] * (1 - 1e-12) <= bound <= matrix[start, v] * (1 + ROUNDING)
@@ -106,7 +106,7 @@ def test_the_steepest_bound_exceeds_any_other_by_the_way_between(case):
     matrix = distances_of(case)
     start = 0
     view = view_toward(mesh, landmarks, start)
-    straight = np.linalg.norm(mesh.topology.positions - mesh.topology.positions[start], axis=1)
+    straight = np.linalg.norm(mesh.positions - mesh.positions[start], axis=1)
     connected = np.flatnonzero(np.isfinite(matrix[start])).tolist()
     least = {q: least_to_start(view, q, straight[q]) for q in connected}
     for v in connected[:: 8 if WITHOUT_JIT else 1]:
@@ -178,7 +178,7 @@ def after(mesh, start, end, *, merges, budget):
     """A pruned sweep, stopped within its first slice of so much work; its bounds."""
     topology = mesh.topology
     wave = new_wavefront(topology, merges=merges, paths=merges, pruned=True)
-    straight = float(np.linalg.norm(topology.positions[start] - topology.positions[end]))
+    straight = float(np.linalg.norm(mesh.positions[start] - mesh.positions[end]))
     goal = goal_at_vertex(mesh, end, 1.5 * straight)
     bounds = (
         merging_bounds(math.inf, GUIDE, math.inf, goal) if merges else exact_bounds(math.inf, goal)
