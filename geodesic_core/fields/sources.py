@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -166,7 +166,7 @@ def nodes_of(
             weights.append(at_corners)
         return node
 
-    starts = [
+    started = [
         (node_of(point), i)
         for i, line in enumerate(sources)
         for point in watched(dict.fromkeys(line))
@@ -177,34 +177,43 @@ def nodes_of(
         (i, parts) for i, line in enumerate(sources) for parts in segments_of(mesh, watched(line))
     ]
     first_segment = vertices + len(sited)
-    starts += [(first_segment + k, i) for k, (i, _) in enumerate(segments)]
+    started += [(first_segment + k, i) for k, (i, _) in enumerate(segments)]
     in_faces = [
         (first_segment + k, part) for k, (_, parts) in enumerate(segments) for part in parts
     ]
-    faces = [face for _, face, _ in rows] + [part.face for _, part in in_faces]
     return Nodes(
-        sources=np.array([node for node, _ in starts], np.int32),
-        source_indices=np.array([source for _, source in starts], np.int32),
+        sources=np.array([node for node, _ in started], np.int32),
+        source_indices=np.array([source for _, source in started], np.int32),
         targets=np.array(ends, np.int32),
-        sites=NO_SITES
-        if not faces
-        else Sites(
-            nodes=len(sited) + len(segments),
-            ints=np.array(rows, np.int32).reshape(-1, SITE),
-            weights=np.array(weights).reshape(-1, 3),
-            windows=sum(_edge_faces(mesh, face) for face in watched(faces)),
-            segment_ints=np.array([(k, part.face) for k, part in in_faces], np.int32).reshape(
-                -1, SEGMENT
-            ),
-            segment_ends=np.array([part.start + part.end for _, part in in_faces]).reshape(
-                -1, SEGMENT_ENDS
-            ),
-        ),
+        sites=_sites_of(mesh, len(sited) + len(segments), rows, weights, in_faces, watched),
         first_target=first_target,
         points=tuple(sited),
         segments=tuple(parts[0] for _, parts in segments),
         first_segment=first_segment,
         components=tuple({component_of(mesh, line[0]) for line in watched(sources)}),
+    )
+
+
+def _sites_of(
+    mesh: TriangleMesh,
+    nodes: int,
+    rows: Sequence[tuple[int, int, int]],
+    weights: Sequence[tuple[float, ...]],
+    in_faces: Sequence[tuple[int, SegmentInFace]],
+    watched: Callable[[Sequence[int]], Iterable[int]],
+) -> Sites:
+    """Return the sites of so many nodes: the rows of points, and the segments in each face."""
+    faces = [face for _, face, _ in rows] + [part.face for _, part in in_faces]
+    if not faces:
+        return NO_SITES
+    ends = [part.start + part.end for _, part in in_faces]
+    return Sites(
+        nodes=nodes,
+        ints=np.array(rows, np.int32).reshape(-1, SITE),
+        weights=np.array(weights).reshape(-1, 3),
+        windows=sum(_edge_faces(mesh, face) for face in watched(faces)),
+        segment_ints=np.array([(k, p.face) for k, p in in_faces], np.int32).reshape(-1, SEGMENT),
+        segment_ends=np.array(ends).reshape(-1, SEGMENT_ENDS),
     )
 
 
@@ -254,12 +263,12 @@ _NAMED = 10
 """Sources that a warning names, at most"""
 
 
-def _warn_of_walled_in(mesh: TriangleMesh, starts: Sequence[SurfacePoint]) -> None:
+def _warn_of_walled_in(mesh: TriangleMesh, sources: Sequence[SurfacePoint]) -> None:
     """Warn of sources in blocked faces only; a curve is never there."""
-    found = walled_in(mesh, starts)
+    found = walled_in(mesh, sources)
     if not found:
         return
-    names = [f"source {i}, {starts[i]}" for i in found[:_NAMED]]
+    names = [f"source {i}, {sources[i]}" for i in found[:_NAMED]]
     names += [f"{len(found) - _NAMED} more"] if len(found) > _NAMED else []
     verb, them = ("lies", "it") if len(found) == 1 else ("lie", "them")
     message = f"{'; '.join(names)}, {verb} in blocked faces only: no path leaves {them}"

@@ -52,25 +52,29 @@ def find_matrix(
     mesh, limit = workspace.mesh, as_limit(max_distance)
     check_choice("layout", layout, get_args(Layout))
     most = as_threads(threads)
-    starts = as_points(mesh, sources, "source", control)
-    stops = starts if targets is None else as_points(mesh, targets, "target", control)
+    source_points = as_points(mesh, sources, "source", control)
+    target_points = (
+        source_points if targets is None else as_points(mesh, targets, "target", control)
+    )
     table: _Dense | _Sparse | _Pairs
     if layout == "pairs":
         if targets is None:
             raise InvalidArgument("pairs need targets, one for each source")
-        table = _Pairs(mesh, starts, stops, SWEEP_FROM if sweep_of is ExactSweep else 1, control)
+        table = _Pairs(
+            mesh, source_points, target_points, SWEEP_FROM if sweep_of is ExactSweep else 1, control
+        )
     elif layout == "dense":
-        control.check_memory(8 * len(starts) * len(stops))
-        table = _Dense(Plan.of(mesh, starts, stops, control, in_order=False))
+        control.check_memory(8 * len(source_points) * len(target_points))
+        table = _Dense(Plan.of(mesh, source_points, target_points, control, in_order=False))
     else:
-        table = _Sparse(Plan.of(mesh, starts, stops, control, in_order=True))
+        table = _Sparse(Plan.of(mesh, source_points, target_points, control, in_order=True))
     rest = control
     if isinstance(table, _Pairs) and len(table.searched):
         few, parts = len(table.searched), len(table.searched) + len(table.sweeps)
         finder = workspace.path_search()
         for done, i in enumerate(table.searched.tolist()):
             part = control.for_part(done, parts)
-            table.values[i] = _searched(finder, starts[i], stops[i], limit, part)
+            table.values[i] = _searched(finder, source_points[i], target_points[i], limit, part)
         rest = control.for_part(few, parts, len(table.sweeps)).holding(finder.nbytes)
     fill(table, mesh, table.ends, limit, sweep_of, most, rest, workspace.target_sweep)
     if control.progress is not None:

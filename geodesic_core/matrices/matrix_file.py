@@ -7,8 +7,8 @@ import json
 import math
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -163,20 +163,15 @@ def write_matrix(
     limit = as_limit(max_distance)
     check_choice("dtype", dtype, ("float64", "float32"))
     most = as_threads(threads)
-    path = Path(out)
-    suffix = path.suffix.lower()
-    check_choice("the suffix of out", suffix, SUFFIXES)
-    if not path.parent.is_dir():
-        raise InvalidArgument(f"there is no folder {path.parent}")
-    if not may_replace(path):
-        raise InvalidArgument(f"{path} is a folder that may hold other data: choose another name")
-    require(suffix)
+    path, suffix = _place_for(out)
     mesh, control = with_barriers(as_mesh(mesh), barriers, control)
     method_sweep = sweep_of(mesh, method, relative_error, absolute_error, effort)
     bound = promise_of(mesh, method, relative_error, absolute_error, effort)
-    starts, rows = _points(mesh, sources, "source", control)
-    stops, columns = (None, rows) if targets is None else _points(mesh, targets, "target", control)
-    plan = Plan.of(mesh, starts, stops, control, in_order=suffix in SPARSE)
+    source_points, rows = _points(mesh, sources, "source", control)
+    target_points, columns = (
+        (None, rows) if targets is None else _points(mesh, targets, "target", control)
+    )
+    plan = Plan.of(mesh, source_points, target_points, control, in_order=suffix in SPARSE)
     chosen: Mapping[str, Mapping[str, Any]] = {
         "approximate": {"relative_error": relative_error, "absolute_error": absolute_error},
         "fast": {"effort": effort},
@@ -197,12 +192,8 @@ def write_matrix(
     layout, blocks = dense if suffix in DENSE else sparse, Blocks.beside(path)
     with blocks.open(facts):
         sink = _Rows(plan, blocks, partial(layout.block_of, dtype=np.dtype(dtype)), control)
-        try:
+        with sink.kept_if_stopped():
             fill(sink, mesh, plan.ends, limit, method_sweep, most, control)
-        except BaseException:
-            with suppress(OSError):  # a full disk is what may have stopped the call
-                sink.keep()
-            raise
         write_table(plan, blocks, np.dtype(dtype), facts, path)
         written = MatrixFile(path, plan.shape, bound, sha256_of(path), len(sink.sweeps))
         _write_beside(path, facts | {"sha256": written.sha256})
@@ -210,6 +201,25 @@ def write_matrix(
     if control.progress is not None:
         control.progress(1.0)
     return written
+
+
+def _place_for(out: str | Path) -> tuple[Path, str]:
+    """Return the path of a file that can be written, and its suffix.
+
+    Raises
+    ------
+    InvalidArgument, MissingExtra
+        As in `write_matrix`.
+    """
+    path = Path(out)
+    suffix = path.suffix.lower()
+    check_choice("the suffix of out", suffix, SUFFIXES)
+    if not path.parent.is_dir():
+        raise InvalidArgument(f"there is no folder {path.parent}")
+    if not may_replace(path):
+        raise InvalidArgument(f"{path} is a folder that may hold other data: choose another name")
+    require(suffix)
+    return path, suffix
 
 
 def _points(
@@ -274,6 +284,16 @@ class _Rows:
                 return
             del self._unfinished[block]
         self._blocks.put(block, self._block_of(self._plan, block, rows))
+
+    @contextmanager
+    def kept_if_stopped(self) -> Iterator[None]:
+        """Keep the rows that are there, where an exception ends the block."""
+        try:
+            yield
+        except BaseException:
+            with suppress(OSError):  # a full disk is what may have stopped the call
+                self.keep()
+            raise
 
     def keep(self) -> None:
         """Write the rows of blocks that are not complete."""

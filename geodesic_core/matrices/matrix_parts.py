@@ -95,10 +95,12 @@ class MatrixParts:
         self._sweep_of = sweep_of(self._mesh, method, *errors, effort)
         self._limit = as_limit(max_distance)
         self._dtype = np.dtype(dtype)
-        starts = as_points(self._mesh, sources, "source", control)
-        stops = None if targets is None else as_points(self._mesh, targets, "target", control)
+        source_points = as_points(self._mesh, sources, "source", control)
+        target_points = (
+            None if targets is None else as_points(self._mesh, targets, "target", control)
+        )
         self._is_sparse = layout == "sparse"
-        plan = Plan.of(self._mesh, starts, stops, control, in_order=self._is_sparse)
+        plan = Plan.of(self._mesh, source_points, target_points, control, in_order=self._is_sparse)
         rows = _part_rows(plan.width, len(self._mesh.faces), max_distance)
         self._plan = replace(plan, block_rows=rows)
 

@@ -60,12 +60,12 @@ class Plan:
             if not in_order:
                 order = sweep_order(np.array([mesh.position(point) for point in sources]))
                 sources = [sources[i] for i in order.tolist()]
-            starts, others = sources, sources
+            swept_from, others = sources, sources
         else:
-            starts, others = (targets, sources) if is_flipped else (sources, targets)
+            swept_from, others = (targets, sources) if is_flipped else (sources, targets)
         width = len(others)
         return cls(
-            ends_of(mesh, starts, others, control),
+            ends_of(mesh, swept_from, others, control),
             (len(sources), len(sources if targets is None else targets)),
             is_flipped,
             targets is None,

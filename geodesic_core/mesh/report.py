@@ -220,6 +220,12 @@ def report_of(
 
 def warnings_of(report: MeshReport) -> Iterator[str]:
     """Yield sentences on the defects of a mesh and their remedies, for its user."""
+    yield from _warnings_of_gaps(report)
+    yield from _warnings_of_faces(report)
+    yield from _warnings_of_seams(report)
+
+
+def _warnings_of_gaps(report: MeshReport) -> Iterator[str]:
     if report.components > 1:
         yield (
             f"The mesh has {report.components} connected components; their lowest vertices are "
@@ -255,6 +261,9 @@ def warnings_of(report: MeshReport) -> Iterator[str]:
             f"{_vertices(sample.count)} in no face and unreachable; the first is vertex "
             f"{sample.ids[0]}."
         )
+
+
+def _warnings_of_faces(report: MeshReport) -> Iterator[str]:
     sample = report.repeated_vertex_faces
     if sample.count:
         yield (
@@ -277,6 +286,9 @@ def warnings_of(report: MeshReport) -> Iterator[str]:
     sample = report.degenerate_faces
     if sample.count:
         yield f"{_faces(sample.count)} without area; the first is face {sample.ids[0]}."
+
+
+def _warnings_of_seams(report: MeshReport) -> Iterator[str]:
     sample = report.non_manifold_edges
     if sample.count:
         yield (
