@@ -25,7 +25,7 @@ def with_barriers(
     faces = as_barriers(barriers, len(mesh.faces))
     if len(faces) == 0:
         return mesh, control
-    control = control.holding(sum(array.nbytes for array in mesh.topology))
+    control = control.holding(sum(a.nbytes for a in (*mesh.topology, mesh.positions)))
     control.check_memory(0)
     control.checkpoint(0.0)
     return mesh.with_barriers(faces), control
