@@ -1,16 +1,9 @@
-"""Query requests: the body and what comes with it, read from HTTP, and the way to a response.
+"""Query requests: the body and what comes with it, read from HTTP, and the way to a response."""
 
-Large bodies are read and checked in a thread, so that the event loop goes on. On the event loop
-40 000 points would take a tenth of a second.
-"""
-
-from collections.abc import Callable, Coroutine
+from collections.abc import Coroutine
 from dataclasses import dataclass
-from functools import partial
-from time import sleep, thread_time
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
-from anyio import to_thread
 from fastapi import Depends, Header, Request, Response
 from pydantic import Field
 from pydantic_core import from_json
@@ -25,6 +18,7 @@ from app.http.dependencies import (
     service_of,
     while_connected,
 )
+from app.http.large_bodies import LARGE, large_bodies_of
 from app.http.responses import (
     CACHED,
     NEGOTIATED,
@@ -41,37 +35,7 @@ from app.schemas.requests import AnswerParameters
 from app.service.answering import Answered
 from app.service.question import Question
 from app.service.request_context import RequestContext
-from app.service.time_limit import time_limit
 from app.settings import Settings
-
-LARGE = 2**16
-"""Bytes of a body that is worth a thread: it takes some milliseconds."""
-
-T = TypeVar("T")
-
-
-async def offload_if_large(request: Request, deadline_s: float, do: Callable[[], T]) -> T:
-    """Run work whose time grows with the body: in a thread, where the body is large.
-
-    Only one thread runs at a time. Several would take the interpreter from each other, and from the
-    event loop. A request waits for it no longer than its client, and no longer than ``deadline_s``.
-    """
-    if len(await request.body()) < LARGE:
-        return do()
-    limiter = request.app.state.large_bodies
-    working = to_thread.run_sync(partial(_at_half_pace, do), limiter=limiter)
-    async with time_limit(service_of(request).settings, deadline_s):
-        return await while_connected(request, working)
-
-
-def _at_half_pace(do: Callable[[], T]) -> T:
-    """Do what holds the interpreter, and rest as long, so that others get at least half of it."""
-    began = thread_time()
-    try:
-        return do()
-    finally:
-        sleep(thread_time() - began)
-
 
 _LEAST_BYTES_OF_VALUE = 7
 """Bytes a value for a body that is full: indices of six digits. To parse denser ones takes long."""
@@ -117,7 +81,7 @@ class QueryRequest:
             query.written  # noqa: B018 - computes and caches it
             return query
 
-        query = await offload_if_large(request, context.deadline_s, make_query)
+        query = await large_bodies_of(request).check(request, context.deadline_s, make_query)
         representation = negotiated(request, parameters, query.offers)
         media_type = representation.media_type
         question = Question(query, size, representation, context.caller.name)

@@ -1,23 +1,19 @@
 """Refused bodies: however many elements are faulty, few are looked at."""
 
 from contextlib import nullcontext
-from pathlib import Path
 from typing import Any
 
-import anyio
 import pytest
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, TypeAdapter, ValidationError, create_model
-from starlette.requests import Request
 
 from app.errors import ProblemError
+from app.http import large_bodies
 from app.http.routes import query_request
 from app.http.routes.query_route import read
-from app.main import create_app
 from app.queries import KINDS
 from app.schemas.points import Curve, CurveSource
 from app.settings import Settings
-from tests.support.waiting import LONG_S
 
 MODELS = [query.model for query in KINDS.values()]
 LISTS = [
@@ -134,24 +130,11 @@ def test_a_body_of_64_kib_may_hold_any_number_of_values(most_bytes: int) -> None
 
 @pytest.mark.parametrize("fails", [False, True])
 def test_reading_a_large_body_rests_as_long_as_it_held_the_interpreter(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fails: bool
+    monkeypatch: pytest.MonkeyPatch, fails: bool
 ) -> None:
     clock, rests = iter([1.0, 3.5]), []
-    monkeypatch.setattr(query_request, "thread_time", lambda: next(clock))
-    monkeypatch.setattr(query_request, "sleep", rests.append)
-
-    async def receive() -> Any:
-        if parts:
-            return parts.pop()
-        return await anyio.sleep_forever()
-
-    async def ask() -> int:
-        app = create_app(Settings(store=tmp_path, workers=1))
-        request = Request({"type": "http", "app": app}, receive)
-        return await query_request.offload_if_large(request, LONG_S, lambda: 1 // (not fails))
-
-    parts = [{"type": "http.request", "body": b"1" * query_request.LARGE}]
-
+    monkeypatch.setattr(large_bodies, "thread_time", lambda: next(clock))
+    monkeypatch.setattr(large_bodies, "sleep", rests.append)
     with pytest.raises(ZeroDivisionError) if fails else nullcontext():
-        assert anyio.run(ask) == 1
+        assert large_bodies.at_half_pace(lambda: 1 // (not fails)) == 1
     assert rests == [2.5]
