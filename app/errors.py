@@ -105,7 +105,10 @@ CODES: Mapping[str, Code] = {
         "The stored files of this mesh are damaged; upload the mesh again.",
     ),
     "queue_full": Code(
-        503, "Queue full", "Too many requests wait for a worker; see `Retry-After`."
+        503,
+        "Queue full",
+        "Too many requests wait for a worker, or too many uploads are under way; see "
+        "`Retry-After`.",
     ),
     "too_many_connections": Code(
         503, "Too many connections", "The service has too many open connections; try again."
@@ -231,6 +234,19 @@ def over_limit(
     return problem(code, detail, limit=limit, actual=actual, setting=variable, **members)
 
 
+def too_large_unpacked(limit: int, max_bytes: int) -> ProblemError:
+    """Return the exception for a packed file that has more than ``limit`` bytes when unpacked.
+
+    Where that is less than ``max_bytes``, the file grows more than a mesh does.
+    """
+    if limit == max_bytes:
+        detail = f"the file is larger than {limit} bytes when unpacked"
+        setting = variable_of("max_upload_bytes")
+        return problem("upload_too_large", detail, limit=limit, setting=setting)
+    detail = f"the file is packed too tightly: it is larger than {limit} bytes when unpacked"
+    return problem("upload_too_large", detail, limit=limit, hint="send it without compression")
+
+
 def pointer(*parts: str | int) -> str:
     """Return the JSON pointer (RFC 6901) of a place in the body."""
     return "".join("/" + str(part).replace("~", "~0").replace("/", "~1") for part in parts)
@@ -258,13 +274,9 @@ def _too_many_faces(error: core.TooManyFaces) -> Problem:
     return over_limit("limit_exceeded", "faces", error.faces, error.max_faces, "max_faces").problem
 
 
-def _too_large_unpacked(error: core.FileTooLarge) -> Problem:
-    return Problem(
-        "upload_too_large",
-        str(error),
-        limit=error.max_bytes,
-        setting=variable_of("max_upload_bytes"),
-    )
+def _too_many_vertices(error: core.TooManyVertices) -> Problem:
+    counts = error.vertices, error.max_vertices
+    return over_limit("limit_exceeded", "vertices", *counts, "max_vertices").problem
 
 
 def _unknown_file_type(error: core.UnknownFileType) -> Problem:
@@ -318,7 +330,7 @@ def _internal_error(_error: BaseException) -> Problem:
 EXCEPTIONS: Sequence[tuple[type[BaseException], Callable[[Any], Problem]]] = (
     (ProblemError, lambda error: error.problem),
     (core.TooManyFaces, _too_many_faces),
-    (core.FileTooLarge, _too_large_unpacked),
+    (core.TooManyVertices, _too_many_vertices),
     (core.UnknownFileType, _unknown_file_type),
     (core.MissingExtra, lambda error: Problem("unsupported_media_type", str(error))),
     (core.InvalidMesh, _invalid_mesh),

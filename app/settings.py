@@ -53,6 +53,10 @@ def _query_bytes(data: dict[str, Any]) -> int:
     return min(4 * MIB, int(data["max_upload_bytes"]))
 
 
+def _scratch_bytes(data: dict[str, Any]) -> int:
+    return 8 * int(data["max_upload_bytes"])
+
+
 def _connections(_data: dict[str, Any]) -> int:
     # The other half is for files, and for the sockets of workers.
     return min(1000, resource.getrlimit(resource.RLIMIT_NOFILE)[0] // 2)
@@ -163,10 +167,14 @@ class Settings(BaseSettings):
     """Size of the stored distance fields; only those that took more than 50 ms are stored."""
     max_upload_bytes: PositiveInt = 512 * MIB
     """Largest body of an upload."""
+    scratch_bytes: PositiveInt = Field(default_factory=_scratch_bytes)
+    """Size of the uploads under way, unpacked ones included; by default eight of the largest."""
     max_query_bytes: PositiveInt = Field(default_factory=_query_bytes)
     """Largest body of a query; by default 4 MiB."""
     max_faces: PositiveInt = 5_000_000
     """Most faces of a mesh."""
+    max_vertices: PositiveInt = 3_000_000
+    """Most vertices of a mesh; a closed one has half as many as faces."""
     max_sources: PositiveInt = 10_000
     """Most sources of a query; each point of a curve counts. Large matrices may have more."""
     max_matrix_cells: PositiveInt = 10_000_000
@@ -298,6 +306,7 @@ class Settings(BaseSettings):
 
 _AT_MOST = (
     ("max_query_bytes", "max_upload_bytes"),
+    ("max_upload_bytes", "scratch_bytes"),
     ("query_memory_bytes", "worker_memory_bytes"),
     ("max_caller_connections", "max_connections"),
 )

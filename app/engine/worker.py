@@ -31,7 +31,7 @@ from app.engine.work import (
     TaskResult,
     Work,
 )
-from app.errors import ProblemError, problem_of
+from app.errors import ProblemError, problem_of, too_large_unpacked
 from app.queries import (
     SMALL_SECONDS,
     ExecutionContext,
@@ -47,6 +47,7 @@ from app.store.fields import FieldStore
 from app.store.lru_cache import LRUCache
 from app.store.meshes import MeshStore, OpenMesh
 from app.store.results import Buffer, body_path, write_result, write_result_file
+from app.store.scratch import most_unpacked
 from app.tracing import Period
 
 logger = structlog.get_logger(module=__name__)
@@ -138,9 +139,11 @@ class Worker:
     def _store(self, work: StoreMesh, clock: "Clock", cancel: Callable[[], bool]) -> TaskResult:
         try:
             with clock.phase("load"):
-                mesh = _make_mesh(work.mesh_input, self.settings)
+                mesh = _make_mesh(work.mesh_input, self.settings, cancel)
+            _stop_if(cancel)
             with clock.phase("store"):
-                written = self.store.write_aside(mesh, work.folder, work.owner, work.name)
+                check = partial(_stop_if, cancel)
+                written = self.store.write_aside(mesh, work.folder, work.owner, work.name, check)
         except FileNotFoundError:
             if cancel():  # then the upload and the scratch folder are removed
                 raise gc.errors.Cancelled from None
@@ -313,7 +316,7 @@ class Worker:
 
 def _stop_if(cancel: Callable[[], bool]) -> None:
     if cancel():
-        raise gc.errors.Cancelled("cancelled while the answer was written")
+        raise gc.errors.Cancelled("cancelled between two steps of the work")
 
 
 @contextmanager
@@ -341,28 +344,40 @@ class Clock:
         self.periods[name] = Period(start_ns, time_ns())
 
 
-def _make_mesh(mesh_input: MeshInput, settings: Settings) -> gc.TriangleMesh:
-    max_faces = settings.max_faces
+def _make_mesh(
+    mesh_input: MeshInput, settings: Settings, cancel: Callable[[], bool]
+) -> gc.TriangleMesh:
+    max_faces, max_vertices = settings.max_faces, settings.max_vertices
     faces: NDArray[np.int32] | NDArray[np.int64]
+    sample: gc.TriangleMesh | None = None
     match mesh_input:
         case MeshFromSample():
             sample = gc.samples.SAMPLES[mesh_input.sample](mesh_input.faces)
-            if len(sample.faces) <= max_faces and mesh_input.merge == "none":
-                return sample
             vertices, faces = sample.vertices, sample.faces
-        case MeshFromFile(file_type="json"):
-            refuse_beyond_limit(_JSON_GROWS * mesh_input.path.stat().st_size)
-            vertices, faces = read_json_mesh(mesh_input.path.read_bytes())
-        case MeshFromFile():
-            return gc.load_mesh(
-                mesh_input.path,
-                mesh_input.file_type,
-                mesh_input.merge,
-                max_faces=max_faces,
-                max_bytes=settings.max_upload_bytes,
-            )
+        case MeshFromFile(path=path, file_type="json"):
+            refuse_beyond_limit(_JSON_GROWS * path.stat().st_size)
+            vertices, faces = read_json_mesh(path.read_bytes())
+        case MeshFromFile(path=path):
+            max_bytes = most_unpacked(path.stat().st_size, settings.max_upload_bytes)
+            try:
+                return gc.load_mesh(
+                    path,
+                    mesh_input.file_type,
+                    mesh_input.merge,
+                    max_faces=max_faces,
+                    max_vertices=max_vertices,
+                    max_bytes=max_bytes,
+                    cancel=cancel,
+                )
+            except gc.errors.FileTooLarge:
+                raise too_large_unpacked(max_bytes, settings.max_upload_bytes) from None
     if len(faces) > max_faces:
         raise gc.errors.TooManyFaces(len(faces), max_faces)
+    if len(vertices) > max_vertices:
+        raise gc.errors.TooManyVertices(len(vertices), max_vertices)
+    if sample is not None and mesh_input.merge == "none":
+        return sample
+    _stop_if(cancel)
     return gc.TriangleMesh(vertices, faces, merge=mesh_input.merge)
 
 

@@ -36,6 +36,7 @@ from app.store.interface import Store
 from app.store.mesh_catalog import MeshCatalog
 from app.store.ownership import Share
 from app.store.results import ResultStore
+from app.store.scratch import Scratch
 
 _CATALOG_PERIOD_S = 2.0
 """Seconds between two looks at what other services did to meshes, where they are shared"""
@@ -59,8 +60,8 @@ class Service:
         self.settings = settings
         self.database = _database_of(settings)
         self.store = store_of(settings)
+        self.scratch = Scratch(settings.folder, settings.scratch_bytes)
         self.mesh_catalog = MeshCatalog(
-            settings.folder,
             self.store.meshes,
             settings.store_bytes,
             evicts=settings.store_evict == "lru",
@@ -105,7 +106,8 @@ class Service:
         share_arenas()
         with self.owning_store() as share:
             is_alone = share is None or share.is_first
-            self.mesh_catalog.prepare(is_alone=is_alone)
+            self.scratch.prepare(is_alone=is_alone)
+            self.mesh_catalog.prepare()
             self.results.prepare(is_alone=is_alone)
             if is_alone:
                 self.fields.prepare(self.mesh_catalog.ids)
@@ -184,10 +186,10 @@ class Service:
     ) -> StoredMesh:
         """Have a worker read or make a mesh, and store it under a name, if it has one."""
         async with (
-            self.mesh_catalog.scratch_folder() as scratch,
+            self.scratch.folder(context.caller.name) as scratch,
             time_limit(self.settings, context.deadline_s),
         ):
-            work = StoreMesh(mesh_input, scratch / "mesh", context.caller.owner, name)
+            work = StoreMesh(mesh_input, scratch.path / "mesh", context.caller.owner, name)
             task = Task(work, context.caller.name)
             while True:
                 done = await self.engine.run(task, ignore_progress)

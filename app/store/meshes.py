@@ -106,12 +106,18 @@ class MeshStore:
         self.folder = root / MESHES
 
     def write_aside(
-        self, mesh: TriangleMesh, folder: Path, owner: str | None, name: str | None = None
+        self,
+        mesh: TriangleMesh,
+        folder: Path,
+        owner: str | None,
+        name: str | None = None,
+        check: Callable[[], None] = lambda: None,
     ) -> WrittenMesh:
         """Write ``mesh`` into a new scratch ``folder``, unless it is intact in the store.
 
         A mesh in the store belongs to the ``owner`` that stored it first, and keeps the ``name``
-        that it got then, as far as its manifest still tells.
+        that it got then, as far as its manifest still tells. Before each array ``check`` is called;
+        it may raise.
         """
         arrays = mesh.arrays()
         mesh_id = content_hash(arrays)
@@ -119,6 +125,10 @@ class MeshStore:
             if self.is_intact(mesh_id):
                 return WrittenMesh(self.manifest(mesh_id), folder=None)
         folder.mkdir()
+        checksums = {}
+        for array_name, array in arrays.items():
+            check()
+            checksums[array_name] = _write_array(folder / f"{array_name}.npy", array)
         manifest = {
             "id": mesh_id,
             "owner": owner,
@@ -126,9 +136,7 @@ class MeshStore:
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
             "report": mesh.report.as_dict(),
             "warnings": list(mesh.warnings),
-            "crc32": {
-                name: _write_array(folder / f"{name}.npy", array) for name, array in arrays.items()
-            },
+            "crc32": checksums,
         }
         with suppress(ProblemError):  # there is no such mesh, or its manifest is damaged
             stored = self.manifest(mesh_id)

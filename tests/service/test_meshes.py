@@ -1,10 +1,13 @@
 import bz2
 import gzip
 import json
+import tempfile
 import zipfile
+from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
-from typing import get_args
+from random import Random
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -17,7 +20,14 @@ from app.settings import Settings
 from app.store.manifests import MANIFEST, encode_manifest, read_manifest
 from geodesic_core import samples
 from geodesic_core.io.load import _READERS
-from tests.support.service import check_problem, serving, store_mesh, stored_mesh, upload_sample
+from tests.support.service import (
+    ServiceClient,
+    check_problem,
+    serving,
+    store_mesh,
+    stored_mesh,
+    upload_sample,
+)
 
 
 def zipped(name: str, content: str) -> bytes:
@@ -470,7 +480,8 @@ def test_refused_uploads(client: TestClient, upload: dict, status: int, code: st
 def test_a_compressed_body_is_bounded_by_what_it_holds(tmp_path: Path, excess: int) -> None:
     """A megabyte can hold a gigabyte; no more than the limit is ever written."""
     limit = 3 * 2**20
-    content = OBJ.encode().ljust(limit + excess, b"\n")
+    noise = b"\n#" + Random(1).randbytes(limit).hex().encode()
+    content = (OBJ.encode() + noise)[: limit + excess]
     with serving(tmp_path, max_upload_bytes=limit, max_query_bytes=100) as client:
         response = client.post("/v1/meshes", content=gzip.compress(content), headers=GZIPPED)
         if not excess:
@@ -480,6 +491,75 @@ def test_a_compressed_body_is_bounded_by_what_it_holds(tmp_path: Path, excess: i
         assert problem["limit"] == limit
         assert problem["setting"] == "GEODESIC_MAX_UPLOAD_BYTES"
         assert client.get("/v1/meshes").json()["meshes"] == []
+
+
+BOMB = gzip.compress(b"#" * 10**7)
+
+
+@pytest.mark.parametrize(
+    "upload",
+    [
+        {"content": BOMB, "headers": GZIPPED},
+        {"content": BOMB, "headers": TYPE_OBJ},
+        {"content": zipped("a.obj", "#" * 10**7), "headers": TYPE_OBJ},
+    ],
+    ids=["coding", "gzip", "zip"],
+)
+def test_a_packed_file_may_not_grow_a_thousandfold(
+    client: TestClient, upload: dict[str, Any]
+) -> None:
+    """Ten kilobytes would cost as much as ten megabytes."""
+    problem = check_problem(client.post("/v1/meshes", **upload), 413, "upload_too_large")
+    assert problem["limit"] == 2**20 + 100 * len(upload["content"]) < 10**7
+
+
+def test_ratios_do_not_multiply(client: TestClient) -> None:
+    twice = gzip.compress(gzip.compress(OBJ.encode()))
+    response = client.post("/v1/meshes", content=twice, headers=GZIPPED)
+    assert "so is the body" in check_problem(response, 415, "unsupported_media_type")["detail"]
+
+
+def test_an_upload_without_room_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    """So is one that would wait for a worker without room."""
+
+    def never() -> Iterator[bytes]:
+        pytest.fail("the body is read")
+        yield b""
+
+    def post(client: ServiceClient) -> Any:
+        headers = {**TYPE_OBJ, "Content-Length": "1000"}
+        return client.post("/v1/meshes", content=never(), headers=headers)
+
+    with serving(tmp_path) as client:
+        client.app.state.service.scratch.change("somebody", 8 * 512 * 2**20 - 999)
+        problem = check_problem(post(client), 503, "queue_full")
+        assert problem["setting"] == "GEODESIC_SCRATCH_BYTES"
+        client.app.state.service.scratch.change("somebody", 999 - 8 * 512 * 2**20)
+        client.engine.drain()
+        check_problem(post(client), 503, "draining")
+
+
+def test_all_of_an_upload_is_in_the_store(client: ServiceClient, tmp_path: Path) -> None:
+    """The system's temporary folder may be in memory, beyond all limits."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tempfile, "tempdir", str(tmp_path / "missing"))
+        response = client.post("/v1/meshes", files={"file": ("a.obj", OBJ + "#" * 2 * 2**20)})
+    assert response.status_code in (200, 201)
+
+
+def test_vertices_have_a_limit(tmp_path: Path) -> None:
+    """Those without a face count: a few bytes each, when packed, and as costly as others."""
+    text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    rows = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 2, 2]]
+    with serving(tmp_path, max_vertices=3) as client:
+        assert client.post("/v1/meshes", content=text, headers=TYPE_OBJ).status_code == 201
+        for more in (
+            {"content": text + "v 2 2 2\n", "headers": TYPE_OBJ},
+            {"json": {"vertices": rows, "faces": [[0, 1, 2]]}},
+            {"params": {"sample": "sphere", "faces": 20}},
+        ):
+            problem = check_problem(client.post("/v1/meshes", **more), 422, "limit_exceeded")
+            assert (problem["limit"], problem["setting"]) == (3, "GEODESIC_MAX_VERTICES")
 
 
 def test_limits_of_uploads(tmp_path: Path) -> None:

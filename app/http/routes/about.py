@@ -24,6 +24,7 @@ _LIMITS = (
     "max_upload_bytes",
     "max_query_bytes",
     "max_faces",
+    "max_vertices",
     "max_sources",
     "max_matrix_cells",
     "max_waypoints",

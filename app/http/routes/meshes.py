@@ -231,8 +231,9 @@ async def _add_upload(
     if parameters.faces is not None:
         fault = Fault("/query/faces", "the number of faces can be chosen for a sample only")
         raise problem("invalid_request", fault.message, errors=(fault,))
+    service.engine.refuse_when_full(context.caller.name)  # before the body is read
     async with (
-        service.mesh_catalog.scratch_folder() as folder,
+        service.scratch.folder(context.caller.name) as folder,
         time_limit(service.settings, context.deadline_s),
     ):
         limit = service.settings.max_upload_bytes

@@ -13,7 +13,14 @@ import pytest
 
 from app.encoding import CSV, NPY, Encoded, encode
 from app.engine.signals import Signals
-from app.engine.work import ComputePart, JoinParts, MeshFromSample, StoreMesh, TaskResult
+from app.engine.work import (
+    ComputePart,
+    JoinParts,
+    MeshFromFile,
+    MeshFromSample,
+    StoreMesh,
+    TaskResult,
+)
 from app.engine.worker import Clock, Worker
 from app.errors import Problem
 from app.queries import DistancesQuery, MatrixQuery, PathQuery
@@ -293,6 +300,25 @@ def test_work_that_is_asked_to_stop_stops(tmp_path: Path, accuracy: dict[str, An
     outcome = worker.do(3, work)
     assert isinstance(outcome, TaskResult)
     assert "encode" in outcome.seconds
+
+
+@pytest.mark.parametrize("kind", ["off", "json", "sample"])
+def test_making_a_mesh_stops_when_asked_to(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / f"a.{kind}"
+    path.write_text(
+        '{"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}'
+        if kind == "json"
+        else "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    )
+    from_file = MeshFromFile(path, kind, "none")
+    work = StoreMesh(
+        MeshFromSample("plane", 10, "none") if kind == "sample" else from_file, tmp_path / "mesh"
+    )
+    worker = Worker(worker_config(tmp_path), Signals(stop_number=2))
+
+    assert worker.do(2, work) is None
+    assert not work.folder.exists()
+    assert isinstance(worker.do(3, work), TaskResult)
 
 
 def test_an_answer_that_is_stopped_while_it_is_written_leaves_no_file(

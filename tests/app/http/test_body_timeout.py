@@ -60,7 +60,7 @@ class Dripping:
 
 def app_in(store: Path, **settings: Any) -> Any:
     app = create_app(Settings(store=store, workers=1, **settings))
-    app.state.service.mesh_catalog.prepare()
+    app.state.service.scratch.prepare()
     return app
 
 

@@ -77,6 +77,7 @@ def test_unknown_code(client: TestClient) -> None:
     [
         (core.InvalidMesh("bad"), "invalid_mesh"),
         (core.TooManyFaces(9, 7), "limit_exceeded"),
+        (core.TooManyVertices(9, 7), "limit_exceeded"),
         (core.InvalidPoint("bad"), "invalid_point"),
         (core.InvalidArgument("bad"), "invalid_request"),
         (core.DeadlineExceeded("late"), "deadline_exceeded"),
@@ -112,6 +113,7 @@ def test_invalid_mesh_names_its_elements() -> None:
     ("error", "setting"),
     [
         (core.TooManyFaces(9, 7), "GEODESIC_MAX_FACES"),
+        (core.TooManyVertices(9, 7), "GEODESIC_MAX_VERTICES"),
         (core.MemoryLimitExceeded(9, 7), "GEODESIC_QUERY_MEMORY_BYTES"),
     ],
 )

@@ -32,11 +32,13 @@ from app.store.layout import LAYOUT, StoreError, require_layout
 from app.store.mesh_catalog import CatalogChange, MeshCatalog
 from app.store.meshes import MeshStore, WrittenMesh
 from app.store.ownership import owned
+from app.store.scratch import Scratch
 from tests.support.disks import fill_disk
 from tests.support.paths import ROOT
 from tests.support.service import (
     check_problem,
     distances,
+    scratch_folder,
     serving,
     store_mesh,
     upload_sample,
@@ -235,8 +237,9 @@ def opened(
     root: Path, capacity: int = 2**60, *, evicts: bool = False, quota: int | None = None
 ) -> Iterator[Store]:
     store = MeshStore(root)
-    catalog = MeshCatalog(root, FolderMeshes(root), capacity, evicts=evicts, quota=quota)
+    catalog = MeshCatalog(FolderMeshes(root), capacity, evicts=evicts, quota=quota)
     with owned(root):
+        Scratch(root, 1).prepare()
         catalog.prepare()
         yield store, catalog
 
@@ -247,7 +250,7 @@ def add(
     store, catalog = opened
 
     async def run() -> tuple[str, CatalogChange]:
-        async with catalog.scratch_folder() as folder:
+        async with scratch_folder(store) as folder:
             written = store.write_aside(mesh, folder / "mesh", owner, "plane")
             change = await catalog.add(written)
             assert change is not None
@@ -339,7 +342,7 @@ def test_of_two_uploads_at_the_same_time_the_quota_takes_one(tmp_path: Path) -> 
         ends: list[str] = []
 
         async def add_one(faces: int) -> None:
-            async with catalog.scratch_folder() as folder:
+            async with scratch_folder(store) as folder:
                 written = store.write_aside(plane(faces), folder / "mesh", "alice")
                 await anyio.sleep(0)  # both are written before either is added
                 try:
@@ -428,7 +431,7 @@ def test_two_that_write_one_mesh(tmp_path: Path) -> None:
         meshes, catalog = store
 
         async def run() -> list[bool]:
-            async with catalog.scratch_folder() as folder:
+            async with scratch_folder(meshes) as folder:
                 both = [meshes.write_aside(plane(), folder / name, None) for name in "ab"]
                 kept = await asyncio.gather(*map(catalog.add, both))
                 return [each.is_new for each in kept]
@@ -446,7 +449,7 @@ def test_uploads_at_the_same_time_do_not_exceed_the_bound(tmp_path: Path) -> Non
         meshes, catalog = store
 
         async def run() -> list[Any]:
-            async with catalog.scratch_folder() as folder:
+            async with scratch_folder(meshes) as folder:
                 written = [
                     meshes.write_aside(plane(faces), folder / str(faces), None) for faces in kinds
                 ]
