@@ -87,7 +87,8 @@ CODES: Mapping[str, Code] = {
         429,
         "Quota exceeded",
         "The caller has reached the quota that `setting` names. The status is 429 for jobs and for "
-        "uploads under way (see `Retry-After`), and 507 for stored meshes (see `hint`).",
+        "uploads under way (see `Retry-After`), and 507 for stored meshes and for answers to jobs "
+        "(see `hint`).",
         other_statuses=(507,),
     ),
     "header_too_large": Code(

@@ -3,6 +3,7 @@
 import os
 import re
 import resource
+from ipaddress import ip_network
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 from urllib.parse import urlsplit
@@ -55,6 +56,10 @@ def _query_bytes(data: dict[str, Any]) -> int:
 
 def _scratch_bytes(data: dict[str, Any]) -> int:
     return 8 * int(data["max_upload_bytes"])
+
+
+def _quota_results(data: dict[str, Any]) -> int | None:
+    return int(data["results_bytes"]) // 2 if data["api_keys"] else None
 
 
 def _connections(_data: dict[str, Any]) -> int:
@@ -213,12 +218,16 @@ class Settings(BaseSettings):
     """Size of the meshes that a caller was the first to store; without keys, of all callers."""
     quota_jobs: PositiveInt | None = None
     """Jobs of a caller, until they are removed; without keys, of all callers together."""
+    quota_results_bytes: PositiveInt | None = Field(default_factory=_quota_results)
+    """Size of the answers to a caller's jobs; by default half of all, and all without keys."""
     quota_uploads: PositiveInt | None = None
     """Uploads of a caller that may run at the same time, samples included."""
     max_connections: PositiveInt = Field(default_factory=_connections)
     """Connections that may be open; 1000, or half of the process's descriptors if fewer."""
     max_caller_connections: PositiveInt = Field(default_factory=_caller_connections)
     """Connections from one address; by default a quarter of all. A proxy may need more."""
+    trusted_proxies: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_listed)] = ()
+    """Addresses or networks whose `X-Forwarded-For` names the caller, separated by commas."""
     allowed_hosts: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_listed)] = ()
     """Names that `Host` may have, separated by commas; `*.example.org` allows all subdomains."""
     cors_origins: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_listed)] = ()
@@ -260,6 +269,18 @@ class Settings(BaseSettings):
             if not _ORIGIN.fullmatch(origin):
                 raise ValueError(f"{origin!r} is not an origin such as https://example.org, nor *")
         return origins
+
+    @field_validator("trusted_proxies")
+    @classmethod
+    def _are_networks(cls, proxies: tuple[str, ...]) -> tuple[str, ...]:
+        for proxy in proxies:
+            try:
+                ip_network(proxy)
+            except ValueError:
+                raise ValueError(
+                    f"{proxy!r} is not an address, nor a network as 10.0.0.0/8"
+                ) from None
+        return proxies
 
     @field_validator("allowed_hosts")
     @classmethod

@@ -35,6 +35,9 @@ from app.store.meshes import OpenMesh
 VALUES_OF_POINT = 8
 """Values of a point in JSON: position, distance, and a face with three weights."""
 
+BYTES_OF_VALUE = 8
+"""Bytes of a value of an answer, about: in binary, and in text that is compressed."""
+
 SMALL_SECONDS = 0.05
 """Seconds of work below which a query is small: it need not wait behind long work."""
 
@@ -177,6 +180,10 @@ class Query(ABC, Generic[R]):
     def value_count(self, size: MeshSize) -> int:
         """Return the number of values of the answer in JSON; 0 where only solving yields it."""
         return 0
+
+    def rough_bytes(self, size: MeshSize) -> int:
+        """Return the bytes of the answer, about, as far as they are known before."""
+        return BYTES_OF_VALUE * self.value_count(size)
 
     def written_points(self) -> WrittenPoints:
         """Yield the points of the request, in the order that `solve` takes them."""

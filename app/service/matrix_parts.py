@@ -56,7 +56,7 @@ class MatrixInParts:
             on_progress(done / whole)
 
         needed = query.bytes_in_parts(self.representation, self.size)
-        with self.results.reserving(needed) as reserve, self._using_parts():
+        with self.results.reserving(self.client, needed) as reserve, self._using_parts():
             await self._compute(len(areas), note, reserve)
             found = [self._found[part] for part in range(len(areas))]
             reached = sum(map(_reached, found))

@@ -12,7 +12,7 @@ from app.encoding import Representation
 from app.engine.interface import ProgressCallback
 from app.errors import ProblemError, problem, problem_of
 from app.jobs import Job, JobManager, JobSpec
-from app.queries import KINDS, MeshSize, Query, fingerprint
+from app.queries import KINDS, MatrixQuery, MeshSize, Query, fingerprint
 from app.service.answering import Answered, Answering
 from app.service.progress import LatestProgress
 from app.service.question import Question
@@ -68,9 +68,12 @@ class QueryJobs:
         query = question.query
         query.check_answer(question.representation, question.size, self._settings, as_job=True)
         self._answering.engine.refuse_when_full(question.client)
+        self._results.refuse_without_room(context.caller.owner, self._room(question))
 
         async def solve(on_progress: ProgressCallback) -> Result:
-            return await self._patiently(partial(self._promised, question, on_progress))
+            return await self._patiently(
+                partial(self._promised, question, context.caller.owner, on_progress)
+            )
 
         return await self._jobs.submit(_spec_of(question, context, key), query.written, solve)
 
@@ -97,7 +100,7 @@ class QueryJobs:
         async def attempt() -> Result:
             first = begun.take()
             if first is None:
-                return await self._promised(question, progress)
+                return await self._promised(question, context.caller.owner, progress)
             result, _ = await first
             return await self._results.with_files(result)
 
@@ -108,6 +111,7 @@ class QueryJobs:
         try:
             await asyncio.wait({answering}, timeout=min(wait_s, context.deadline_s))
             if not answering.done():
+                self._results.refuse_without_room(context.caller.owner, self._room(question))
                 spec = _spec_of(question, context, key)
                 job = await self._jobs.submit(spec, question.query.written, solve)
                 if job.spec is not spec:  # an earlier one with the same idempotency key
@@ -144,7 +148,7 @@ class QueryJobs:
                     self._stored_query, spec, size, written, limiter=self._reading
                 )
                 question = Question(query, size, representation, spec.client)
-                return await self._promised(question, on_progress)
+                return await self._promised(question, spec.owner, on_progress)
 
         return await self._patiently(attempt)
 
@@ -160,10 +164,24 @@ class QueryJobs:
                     logger.warning("job waits, since the store does not answer", error=str(error))
                 await asyncio.sleep(_STORE_PAUSE_S)
 
-    async def _promised(self, question: Question, on_progress: ProgressCallback) -> Result:
-        """Answer the question of a job, with files."""
-        result, _ = await self._answering.find_or_compute(question, on_progress, is_promised=True)
-        return await self._results.with_files(result)
+    async def _promised(
+        self, question: Question, owner: str | None, on_progress: ProgressCallback
+    ) -> Result:
+        """Answer the question of a job, with files, for which room is reserved before."""
+        with self._results.reserving(owner, self._room(question)):
+            result, _ = await self._answering.find_or_compute(
+                question, on_progress, is_promised=True
+            )
+            return await self._results.with_files(result)
+
+    def _room(self, question: Question) -> int:
+        """Return the bytes to reserve for an answer; a matrix in parts reserves its own."""
+        query, representation, size = question.query, question.representation, question.size
+        if isinstance(query, MatrixQuery) and query.is_in_parts(
+            representation, size, self._settings, as_job=True
+        ):
+            return 0
+        return query.rough_bytes(size)
 
     def _stored_query(self, spec: JobSpec, size: MeshSize, written: bytes) -> Query[Any]:
         """Return the query of a job, which an older release may have written."""

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Iterator, Mapping
-from contextlib import asynccontextmanager, contextmanager, suppress
+from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from gc import collect, freeze
 from pathlib import Path
@@ -69,7 +69,10 @@ class Service:
             shared=MeshRecords(self.database) if self.database.is_shared else None,
         )
         self.results = ResultStore(
-            self.store.results, settings.results_bytes, settings.results_memory_bytes
+            self.store.results,
+            settings.results_bytes,
+            settings.results_memory_bytes,
+            settings.quota_results_bytes,
         )
         self.fields = FieldStore(settings.folder, settings.fields_bytes)
         self.engine = _engine(settings, self.store)
@@ -222,14 +225,7 @@ class Service:
     async def list_meshes(self, limit: int, after: str) -> tuple[list[Manifest], str | None]:
         """Return the manifests of ``limit`` meshes after an id, and the id to go on after."""
         ids, more = await self.store.meshes.page(after, limit)
-        found = await asyncio.gather(*map(self._manifest_if_any, ids))
-        return [each for each in found if each is not None], ids[-1] if more else None
-
-    async def _manifest_if_any(self, mesh_id: str) -> Manifest | None:
-        # Left out: meshes deleted meanwhile, and damaged ones. Reading those alone says why.
-        with suppress(ProblemError):
-            return await self.store.meshes.manifest(mesh_id)
-        return None
+        return await self.store.meshes.manifests(ids), ids[-1] if more else None
 
     async def delete_mesh(self, mesh_id: str, caller: Caller) -> None:
         """Remove a mesh and its results; afterwards no service that shares the store has it."""

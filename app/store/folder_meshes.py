@@ -44,6 +44,17 @@ class FolderMeshes:
         """Return the manifest of a mesh, which is read once."""
         return self._store.manifest(mesh_id)
 
+    async def manifests(self, ids: Sequence[str]) -> list[Mapping[str, Any]]:
+        """Read manifests in a thread: they may be thousands, each in a file of its own."""
+        return await to_thread.run_sync(self._readable, ids)
+
+    def _readable(self, ids: Sequence[str]) -> list[Mapping[str, Any]]:
+        found = []
+        for mesh_id in ids:
+            with suppress(ProblemError):
+                found.append(self._store.manifest(mesh_id))
+        return found
+
     async def page(self, after: str, limit: int) -> tuple[Sequence[str], bool]:
         """List the folder."""
         return await to_thread.run_sync(self._store.page, after, limit)

@@ -35,6 +35,9 @@ class MeshHome(Protocol):
     async def manifest(self, mesh_id: str) -> Mapping[str, Any]:
         """Return the manifest of a mesh; raises ``ProblemError`` where there is none."""
 
+    async def manifests(self, ids: Sequence[str]) -> list[Mapping[str, Any]]:
+        """Return the manifests of some meshes, without those deleted meanwhile and damaged ones."""
+
     async def page(self, after: str, limit: int) -> tuple[Sequence[str], bool]:
         """Return the next ``limit`` ids after ``after``, in order, and whether more follow."""
 

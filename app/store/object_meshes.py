@@ -101,6 +101,14 @@ class ObjectMeshes:
         """Return the manifest of a mesh, as it was in the store less than a second ago."""
         return (await self._current(mesh_id)).manifest
 
+    async def manifests(self, ids: Sequence[str]) -> list[Mapping[str, Any]]:
+        """Ask the store for several at a time."""
+        found = await asyncio.gather(*map(self.manifest, ids), return_exceptions=True)
+        for each in found:
+            if isinstance(each, BaseException) and not isinstance(each, ProblemError):
+                raise each
+        return [each for each in found if not isinstance(each, BaseException)]
+
     async def page(self, after: str, limit: int) -> tuple[Sequence[str], bool]:
         """List the store."""
         ids = await self._call(self._objects.folders, MESHES)

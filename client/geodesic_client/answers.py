@@ -135,7 +135,7 @@ class StoredMatrix:
     """A matrix that the service keeps in a file: the answer of a job.
 
     `matrix_rows` reads some rows of a dense one, `save_matrix` saves either to a file. The service
-    keeps it until the job is dismissed or expires.
+    keeps it until the job is deleted or expires.
     """
 
     job_id: str

@@ -422,10 +422,16 @@ def job(job_id: str) -> Flow[Job]:
     return to_job((yield from _read(f"/v1/jobs/{job_id}")))
 
 
-def dismiss_job(job: Job | str) -> Flow[Job]:
-    """Stop a job that waits or runs; remove one that has finished."""
+def cancel_job(job: Job | str) -> Flow[Job]:
+    """Stop a job that waits or runs; one that has finished stays, with its answer."""
     job_id = job.id if isinstance(job, Job) else job
-    return to_job((yield from send(Request("DELETE", f"/v1/jobs/{job_id}"))).json())
+    return to_job((yield from send(Request("POST", f"/v1/jobs/{job_id}/cancel"))).json())
+
+
+def delete_job(job: Job | str) -> Flow[None]:
+    """Remove a job and its answer; one that waits or runs is stopped."""
+    job_id = job.id if isinstance(job, Job) else job
+    yield from send(Request("DELETE", f"/v1/jobs/{job_id}"))
 
 
 def _part_of_result(job_id: str, begin: int, end: int) -> Flow[httpx2.Response]:
@@ -519,4 +525,5 @@ class Operations:
     estimate = Method(estimate)
     jobs = Method(jobs)
     job = Method(job)
-    dismiss_job = Method(dismiss_job)
+    cancel_job = Method(cancel_job)
+    delete_job = Method(delete_job)

@@ -285,12 +285,32 @@ export interface paths {
         put?: never;
         post?: never;
         /**
-         * Stop a job, or remove one that has finished
+         * Remove a job and its answer
+         * @description Remove a job, and return its last state; one that waits or runs is stopped first.
+         */
+        delete: operations["deleteJob"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/jobs/{job_id}/cancel": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Stop a job
          * @description Stop a job that waits or runs; its state becomes `dismissed`.
          *
-         *     A job that has finished or was dismissed is removed, with its answer.
+         *     A job that has finished stays as it is, with its answer.
          */
-        delete: operations["dismissJob"];
+        post: operations["cancelJob"];
+        delete?: never;
         options?: never;
         head?: never;
         patch?: never;
@@ -2548,7 +2568,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, quota_exceeded */
             507: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -2811,7 +2831,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, quota_exceeded */
             507: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -3069,7 +3089,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, quota_exceeded */
             507: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -3319,7 +3339,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, quota_exceeded */
             507: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -3569,7 +3589,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, quota_exceeded */
             507: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -3819,7 +3839,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, quota_exceeded */
             507: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -4071,7 +4091,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, quota_exceeded */
             507: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -4317,7 +4337,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, quota_exceeded */
             507: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -4563,7 +4583,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, quota_exceeded */
             507: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -5537,7 +5557,133 @@ export interface operations {
             };
         };
     };
-    dismissJob: {
+    deleteJob: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                job_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobDocument"];
+                };
+            };
+            /** @description malformed_request */
+            400: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description unauthorized */
+            401: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description origin_not_allowed */
+            403: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description job_not_found */
+            404: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description host_not_allowed */
+            421: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description rate_limited */
+            429: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    "Retry-After": components["headers"]["Retry-After"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description header_too_large */
+            431: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description internal_error */
+            500: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description state_unavailable, too_many_connections */
+            503: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    "Retry-After": components["headers"]["Retry-After"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description deadline_exceeded */
+            504: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+        };
+    };
+    cancelJob: {
         parameters: {
             query?: never;
             header?: never;

@@ -29,6 +29,7 @@ TEXTS = {
     "log_format": ("json", "json"),
     "log_probes": ("on", "on"),
     "api_keys": ("", ()),
+    "trusted_proxies": ("10.0.0.1, fd00::/8", ("10.0.0.1", "fd00::/8")),
     "allowed_hosts": ("a.org, *.b.net", ("a.org", "*.b.net")),
     "cors_origins": ("https://a.org, http://b:80", ("https://a.org", "http://b:80")),
 }
@@ -232,6 +233,8 @@ def test_variables_that_the_library_reads_are_no_mistakes(monkeypatch: pytest.Mo
         ("cors_origins", "https://a.org https://b.org"),
         ("cors_origins", "https://a.org,"),
         ("max_connections", "0"),
+        ("trusted_proxies", "*"),
+        ("trusted_proxies", "proxy.example"),
         ("allowed_hosts", "https://a.org"),
         ("allowed_hosts", "a.org:8000"),
         ("allowed_hosts", "A.org"),

@@ -154,30 +154,52 @@ def test_a_large_body_waits_no_longer_than_its_deadline(tmp_path: Path) -> None:
     check_problem(refused, 504, "deadline_exceeded")
 
 
-def test_a_large_body_waits_no_longer_than_its_client(client: ServiceClient, plane: str) -> None:
-    body, sent = json.dumps(MANY).encode(), []
-    scope = {
+def scope_of(path: str, *headers: tuple[bytes, bytes]) -> dict[str, Any]:
+    return {
         "type": "http",
         "method": "POST",
-        "path": f"/v1/meshes/{plane}/distances",
+        "path": path,
         "query_string": b"",
-        "headers": [(b"content-type", b"application/json")],
+        "headers": headers,
         "client": None,
         "server": None,
         "state": {},
     }
-    messages = [{"type": "http.disconnect"}, {"type": "http.request", "body": body}]
+
+
+def status_after(client: ServiceClient, scope: Any, *messages: Any) -> int:
+    """Return the status of the answer to a request that comes in these messages."""
+    coming, sent = iter(messages), []
 
     async def receive() -> Any:
-        return messages.pop()
+        return next(coming)
 
     async def send(message: Any) -> None:
         sent.append(message)
 
-    with others_are_checked(client):
-        client.portal.call(client.app, scope, receive, send)
+    client.portal.call(client.app, scope, receive, send)
+    return int(sent[0]["status"])
 
-    assert sent[0]["status"] == 499
+
+HANGS_UP = {"type": "http.disconnect"}
+
+
+def test_a_large_body_waits_no_longer_than_its_client(client: ServiceClient, plane: str) -> None:
+    body = json.dumps(MANY).encode()
+    scope = scope_of(f"/v1/meshes/{plane}/distances", (b"content-type", b"application/json"))
+    with others_are_checked(client):
+        message = {"type": "http.request", "body": body}
+        assert status_after(client, scope, message, HANGS_UP) == 499
+
+
+@pytest.mark.parametrize("path", ["/v1/meshes", f"/v1/meshes/{'0' * 32}/distances"])
+def test_who_hangs_up_within_a_body_holds_nothing(client: ServiceClient, path: str) -> None:
+    """As often as it does: no place of its caller, and no room for its upload."""
+    headers = (b"content-type", b"application/json"), (b"content-length", b"1000000")
+    begun = {"type": "http.request", "body": b"{", "more_body": True}
+    for _ in range(READ_AT_ONCE + 1):
+        assert status_after(client, scope_of(path, *headers), begun, HANGS_UP) == 499
+    assert client.app.state.service.scratch.reserved == 0
 
 
 def test_small_bodies_need_no_thread(

@@ -9,6 +9,7 @@ from starlette.testclient import TestClient
 
 from app.encoding import negotiate_coding
 from app.encoding.codings import zstd
+from app.encoding.negotiation import MOST_RANGES
 from tests.support.service import check_problem, upload_sample
 from tests.support.waiting import wait_until
 
@@ -172,3 +173,16 @@ def test_estimates_are_of_the_plain_body(client: TestClient, link: str) -> None:
 )
 def test_negotiation(accepted: str | None, coding: str | None) -> None:
     assert negotiate_coding(accepted) == coding
+
+
+@pytest.mark.parametrize("header", ["Accept", "Accept-Encoding"])
+def test_a_header_may_accept_fifty_types_or_codings(
+    client: TestClient, plane: str, header: str
+) -> None:
+    """Thousands of them, which fit into a head, would hold the event loop."""
+    link, item = f"/v1/meshes/{plane}/path?from=0&to=9", "*/*" if header == "Accept" else "gzip"
+    most = {header: ",".join([item] * MOST_RANGES)}
+    assert client.get(link, headers=most).status_code == 200
+    more = {header: f"{most[header]},{item}"}
+    problem = check_problem(client.get(link, headers=more), 431, "header_too_large")
+    assert (problem["limit"], problem["actual"]) == (MOST_RANGES, MOST_RANGES + 1)

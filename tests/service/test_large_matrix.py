@@ -332,7 +332,7 @@ def test_the_clients_read_rows_and_save_files(
     client.save_matrix(matrix, out)
     assert out.read_bytes() == expected.read_bytes()
     assert not part.exists()
-    client.dismiss_job(matrix.job_id)
+    client.delete_job(matrix.job_id)
     with pytest.raises(ProblemError, match="job_not_found"):
         client.matrix_rows(matrix, 0, 1)
 

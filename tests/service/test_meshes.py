@@ -2,6 +2,7 @@ import bz2
 import gzip
 import json
 import tempfile
+import threading
 import zipfile
 from collections.abc import Iterator
 from io import BytesIO
@@ -736,6 +737,23 @@ def test_damage_is_reported(tmp_path: Path) -> None:
         problem = check_problem(response, 500, "mesh_damaged")
         assert "vertices" in problem["detail"]
         assert "upload it again" in problem["hint"]
+
+
+def test_a_list_reads_its_manifests_beside_the_event_loop(
+    client: ServiceClient, plane: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A thousand of them are a thousand files."""
+    readers: set[int] = set()
+
+    def noted(path: str) -> Any:
+        readers.add(threading.get_ident())
+        return read_manifest(path)
+
+    monkeypatch.setattr("app.store.meshes.manifest_of", noted)
+    listed = client.get("/v1/meshes", params={"limit": 1000}).json()["meshes"]
+    assert plane in {mesh["id"] for mesh in listed}
+    assert readers
+    assert client.portal.call(threading.get_ident) not in readers
 
 
 def test_meshes_and_results_survive_a_restart(tmp_path: Path) -> None:

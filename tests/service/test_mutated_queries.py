@@ -212,7 +212,6 @@ def undisturbed(client: ServiceClient, plane: str, mesh: gc.TriangleMesh) -> Ite
     yield
     for job in client.get("/v1/jobs", params={"limit": 1000}).json()["jobs"]:
         client.delete(f"/v1/jobs/{job['id']}")
-        client.delete(f"/v1/jobs/{job['id']}")
     client.wait_until_idle()
     assert client.workers() == workers
     start = np.random.default_rng().random()  # such as was not asked for before

@@ -160,6 +160,29 @@ def test_jobs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         assert asker.submit(ALICE).status_code == 202
 
 
+def test_answers_to_jobs_of_one_caller_leave_room_for_those_of_another(tmp_path: Path) -> None:
+    """Alice fills what she may have; the next job is refused before any work, and Bob's is not."""
+    with keyed(tmp_path, results_bytes=100_000, results_memory_bytes=1) as client:
+        link = f"/v1/meshes/{upload(client, ALICE, 3200).json()['id']}/distances"  # 1 681 vertices
+        assert limits_of(client, ALICE)["GEODESIC_QUOTA_RESULTS_BYTES"] == 50_000
+
+        def submit(caller: Any, vertex: int) -> Any:
+            headers = {**caller, "Prefer": "respond-async", "Accept": "application/x-npy"}
+            return client.post(link, json={"sources": [vertex]}, headers=headers)
+
+        def run(caller: Any, vertex: int) -> None:
+            job = submit(caller, vertex).headers["location"]
+            wait_until(lambda: client.get(job, headers=caller).json()["status"] == "successful")
+
+        for vertex in range(3):
+            run(ALICE, vertex)
+        solved = client.app.state.service.answering.solves["distances"]
+        problem = check_problem(submit(ALICE, 3), 507, "quota_exceeded")
+        assert problem["limit"] == 50_000 < problem["actual"]
+        assert client.app.state.service.answering.solves["distances"] == solved
+        run(BOB, 4)
+
+
 def test_without_keys_all_that_is_stored_has_one_owner(tmp_path: Path) -> None:
     with serving(tmp_path, quota_bytes=100_000, quota_jobs=1) as client:
         mesh_id = upload_sample(client, "plane", 200)

@@ -115,7 +115,7 @@ async def live(store: Store) -> None:
             await end_of(service, job_id)
             store.tell(job_id, "successful")
         store.tell(job_id, "deleting")
-        await service.jobs.dismiss(None, job_id)
+        await service.jobs.remove(None, job_id)
         store.tell(job_id, "deleted")
 
         has_begun = asyncio.Event()
@@ -129,7 +129,7 @@ async def live(store: Store) -> None:
         store.tell(job_id, "accepted")
         await has_begun.wait()
         store.tell(job_id, "deleting")
-        await service.jobs.dismiss(None, job_id)
+        await service.jobs.cancel(None, job_id)
         store.tell(job_id, "dismissed")
 
 

@@ -49,11 +49,16 @@ class CrossSiteMiddleware:
     def _check_origin(self, scope: Scope) -> None:
         headers = Headers(scope=scope)
         # Browsers send it, and pages cannot forge it. It holds where a proxy changes `Host`.
-        if headers.get("sec-fetch-site") in ("same-origin", "none"):
+        site = headers.get("sec-fetch-site")
+        if site in ("same-origin", "none"):
             return
         origin = headers.get("origin")
-        if origin is None or "*" in self.origins or origin in self.origins:
+        if "*" in self.origins or origin in self.origins:
             return
+        if origin is None:
+            if site is not None:
+                raise _origin_not_allowed("another site")
+            return  # no browser
         netloc = _netloc(origin)
         if netloc != headers.get("host", "").lower() and not _is_among(_name(netloc), self.hosts):
             raise _origin_not_allowed(origin)

@@ -40,6 +40,7 @@ _LIMITS = (
     "max_concurrent",
     "quota_bytes",
     "quota_jobs",
+    "quota_results_bytes",
     "quota_uploads",
 )
 

@@ -82,20 +82,33 @@ async def get_job(job: JobDep, response: Response) -> dict[str, Any]:
     return job_document(job)
 
 
-@router.delete(
-    "/{job_id}",
-    operation_id="dismissJob",
-    summary="Stop a job, or remove one that has finished",
+@router.post(
+    "/{job_id}/cancel",
+    operation_id="cancelJob",
+    summary="Stop a job",
     response_model=JobDocument,
     response_model_exclude_unset=True,
     responses=problems("job_not_found", "state_unavailable"),
 )
-async def dismiss_job(job: JobDep, service: ServiceDep, caller: CallerDep) -> dict[str, Any]:
+async def cancel_job(job_id: str, service: ServiceDep, caller: CallerDep) -> dict[str, Any]:
     """Stop a job that waits or runs; its state becomes `dismissed`.
 
-    A job that has finished or was dismissed is removed, with its answer.
+    A job that has finished stays as it is, with its answer.
     """
-    return job_document(await service.jobs.dismiss(caller.owner, job.id))
+    return job_document(await service.jobs.cancel(caller.owner, job_id))
+
+
+@router.delete(
+    "/{job_id}",
+    operation_id="deleteJob",
+    summary="Remove a job and its answer",
+    response_model=JobDocument,
+    response_model_exclude_unset=True,
+    responses=problems("job_not_found", "state_unavailable"),
+)
+async def delete_job(job_id: str, service: ServiceDep, caller: CallerDep) -> dict[str, Any]:
+    """Remove a job, and return its last state; one that waits or runs is stopped first."""
+    return job_document(await service.jobs.remove(caller.owner, job_id))
 
 
 @router.get(

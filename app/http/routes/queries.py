@@ -104,7 +104,7 @@ def _posted(name: str, summary: str, answers: Mapping[int | str, Any]) -> dict[s
         "operation_id": name,
         "summary": summary,
         "response_class": Response,
-        "responses": {**answers, **problems(*_BODY_CODES)},
+        "responses": {**answers, **problems(*_BODY_CODES, quota_exceeded=507)},
     }
 
 
@@ -165,7 +165,7 @@ async def compute_path(
             "description": "The answer has not changed",
             "headers": documented("ETag", "Cache-Control", "Vary"),
         },
-        **problems(*_CODES),
+        **problems(*_CODES, quota_exceeded=507),
     },
 )
 async def get_path(

@@ -113,6 +113,14 @@ def test_a_page_elsewhere_changes_nothing(origin: str, method: str, keys: str) -
     assert status(client, method, Origin=origin, Sec_Fetch_Site="same-site") == 403
 
 
+@pytest.mark.parametrize("site", ["cross-site", "same-site"])
+@pytest.mark.parametrize("method", CHANGING)
+def test_nor_does_one_whose_origin_the_browser_keeps_back(method: str, site: str) -> None:
+    response = client_at(LOOPBACK).request(method, "/v1", headers={"Sec-Fetch-Site": site})
+    check_problem(response, 403, "origin_not_allowed")
+    assert status(client_at(LOOPBACK, cors_origins=("*",)), method, Sec_Fetch_Site=site) == 200
+
+
 @pytest.mark.parametrize("origin", FOREIGN_ORIGINS)
 def test_but_it_may_ask_which_the_browser_does_not_let_it_read(origin: str) -> None:
     assert status(client_at(LOOPBACK), Origin=origin) == 200

@@ -17,6 +17,7 @@ from app.http.protocol import (
     BYTES_BESIDE_HEADER,
     FREE_CHUNKS,
     LEAST_CHUNK,
+    MOST_DRAINED,
     MOST_HEAD_BYTES,
     MOST_PIPELINED,
 )
@@ -72,8 +73,10 @@ ENDLESS = {
 @pytest.mark.parametrize("name", ENDLESS)
 def test_a_head_without_end_is_refused(listener: Listener, name: str) -> None:
     listener.parsed_bytes.clear()
+    listener.drained_bytes.clear()
     check_problem(listener.send(ENDLESS[name]), 431, "header_too_large")
     assert sum(listener.parsed_bytes) <= MOST_HEAD_BYTES + 2 * LARGEST_READ
+    assert sum(listener.drained_bytes) <= MOST_DRAINED + LARGEST_READ
     assert is_alive(listener)
 
 
