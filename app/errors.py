@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from app.settings import variable_of
 from geodesic_core import errors as core
 
 PROBLEM_JSON = "application/problem+json"
@@ -30,6 +29,12 @@ class Code:
 CODES: Mapping[str, Code] = {
     "malformed_body": Code(
         400, "Malformed body", "The body is not valid for its media type, for example broken JSON."
+    ),
+    "idempotency_key_unused": Code(
+        400,
+        "Idempotency key unused",
+        "`Idempotency-Key` names a job, and this request makes none; send it together with "
+        "`Prefer: respond-async`, or leave it out.",
     ),
     "malformed_request": Code(
         400, "Malformed request", "The bytes received are not a valid HTTP request."
@@ -167,10 +172,13 @@ class Problem:
         """The HTTP status."""
         return self.other_status or CODES[self.code].status
 
-    def document(self, instance: str, request_id: str) -> dict[str, Any]:
-        """Return the body of the response (RFC 9457), without members that have no value."""
+    def document(self, instance: str, request_id: str, prefix: str) -> dict[str, Any]:
+        """Return the body of the response (RFC 9457), without members that have no value.
+
+        ``prefix`` is that of the addresses of the service.
+        """
         members = {
-            "type": f"/problems/{self.code}",
+            "type": f"{prefix}/problems/{self.code}",
             "title": CODES[self.code].title,
             "status": self.status,
             "detail": self.detail,
@@ -231,8 +239,7 @@ def over_limit(
         Further members of the problem.
     """
     detail = f"{actual} {what}; at most {limit} are allowed"
-    variable = variable_of(setting)
-    return problem(code, detail, limit=limit, actual=actual, setting=variable, **members)
+    return problem(code, detail, limit=limit, actual=actual, setting=setting, **members)
 
 
 def too_large_unpacked(limit: int, max_bytes: int) -> ProblemError:
@@ -242,8 +249,7 @@ def too_large_unpacked(limit: int, max_bytes: int) -> ProblemError:
     """
     if limit == max_bytes:
         detail = f"the file is larger than {limit} bytes when unpacked"
-        setting = variable_of("max_upload_bytes")
-        return problem("upload_too_large", detail, limit=limit, setting=setting)
+        return problem("upload_too_large", detail, limit=limit, setting="max_upload_bytes")
     detail = f"the file is packed too tightly: it is larger than {limit} bytes when unpacked"
     return problem("upload_too_large", detail, limit=limit, hint="send it without compression")
 

@@ -21,6 +21,7 @@ from app.http.middleware.observation import ObservationMiddleware
 from app.http.middleware.probes import PROBES
 from app.http.middleware.request_id import RequestIdMiddleware
 from app.http.openapi import DOCUMENT, SERVERS, TAGS
+from app.http.prefix import path_in
 from app.http.routes import about, jobs, meshes, queries
 from app.service.service import Service
 from app.settings import Settings
@@ -50,7 +51,7 @@ def create_app(settings: Settings) -> FastAPI:
             "operation_spans": False,
             "metrics": False,  # those of Prometheus are more
             "logs": False,
-            "exclude": lambda scope: scope.get("path") in PROBES,
+            "exclude": lambda scope: path_in(scope) in PROBES,
         },
     )
     app.state.service = service

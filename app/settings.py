@@ -118,6 +118,7 @@ def _keys(value: object) -> object:
 Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 _ORIGIN = re.compile(r"\*|https?://[^/\s?#@A-Z]+")
+_PREFIX = re.compile(r"(/[A-Za-z0-9._~-]+)+")
 _HOST = re.compile(r"(\*\.)?[a-z0-9_-]+(\.[a-z0-9_-]+)*|\[[0-9a-f:]+\]")
 
 
@@ -228,6 +229,8 @@ class Settings(BaseSettings):
     """Connections from one address; by default a quarter of all. A proxy may need more."""
     trusted_proxies: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_listed)] = ()
     """Addresses or networks whose `X-Forwarded-For` names the caller, separated by commas."""
+    root_path: str = ""
+    """Prefix of all addresses, such as `/geodesic`, where a proxy offers the service below it."""
     allowed_hosts: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_listed)] = ()
     """Names that `Host` may have, separated by commas; `*.example.org` allows all subdomains."""
     cors_origins: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_listed)] = ()
@@ -261,6 +264,15 @@ class Settings(BaseSettings):
         ):
             raise ValueError("it is not a URL such as redis://user:secret@host:6379")
         return redis
+
+    @field_validator("root_path")
+    @classmethod
+    def _is_a_prefix(cls, path: str) -> str:
+        if path and not _PREFIX.fullmatch(path):
+            raise ValueError(
+                f"{path!r} is not a prefix such as /geodesic, without a slash at its end"
+            )
+        return path
 
     @field_validator("cors_origins")
     @classmethod

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from app.encoding.views import Line, PointFeature, Surface, Table
+from app.encoding.views import Line, Surface, Table
 
 Buffer = bytes | memoryview
 
@@ -25,7 +25,7 @@ class Answer:
         Names of the members that the views show; the others become headers where they are small.
     values
         Number of values in JSON, where the query could not tell it before; else 0.
-    table, lines, points, surface
+    table, lines, surface
         The views, or functions that make them; None for a view that it lacks. There is at least one
         line.
     """
@@ -36,7 +36,6 @@ class Answer:
     values: int = 0
     table: Table | None = None
     lines: Callable[[], Sequence[Line]] | None = None
-    points: Callable[[], Sequence[PointFeature]] | None = None
     surface: Surface | None = None
 
 

@@ -9,24 +9,20 @@ from app.encoding.arrays import to_npy, to_npz, to_octets
 from app.encoding.blocks import joined
 from app.encoding.codings import compressed
 from app.encoding.csv_table import to_csv
-from app.encoding.geojson import to_geojson
 from app.encoding.json_document import to_json
 from app.encoding.obj_lines import to_obj
 from app.encoding.ply_mesh import to_ply
 from app.encoding.representation import (
     ARRAYS,
     CSV,
-    GEOJSON,
     JSON,
     NPY,
     NPZ,
     OBJ,
     OCTETS,
     PLY,
-    SVG,
     Representation,
 )
-from app.encoding.svg_drawing import to_svg
 
 _ENCODERS: Mapping[str, Callable[..., Encoded]] = {
     JSON: to_json,
@@ -36,8 +32,6 @@ _ENCODERS: Mapping[str, Callable[..., Encoded]] = {
     OBJ: to_obj,
     PLY: to_ply,
     CSV: to_csv,
-    SVG: to_svg,
-    GEOJSON: to_geojson,
 }
 
 

@@ -1,4 +1,4 @@
-"""Views of an answer, for formats without its structure: table, lines, points, surface."""
+"""Views of an answer, for formats without its structure: table, lines, surface."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -56,23 +56,13 @@ class Line:
     points: NDArray[np.float64]
     """(K, 3), mesh units; empty where there is no line"""
     properties: Mapping[str, Any]
-    """Values for GeoJSON and CSV, under the same names in all lines of an answer"""
+    """Values for CSV, under the same names in all lines of an answer"""
     group: str = ""
     """The group in OBJ; lines of one group follow one another"""
     is_closed: bool = False
     """Whether it leads back from its last point to the first, which is not repeated"""
-    shade: float = 0.0
-    """The colour, from 0 to 1"""
     at_points: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     """Columns of K values for the points in CSV, under the same names in all lines"""
-
-
-@dataclass(frozen=True)
-class PointFeature:
-    """A point with its properties in GeoJSON; None for a point that was not found."""
-
-    position: Sequence[float] | None
-    properties: Mapping[str, Any]
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,6 @@ import msgspec
 from app.encoding import Representation
 from app.engine.work import (
     ComputePart,
-    EstimateQuery,
     JoinParts,
     MeshFromFile,
     MeshFromSample,
@@ -40,7 +39,7 @@ from app.engine.work import (
     Work,
 )
 from app.errors import CODES, Problem
-from app.queries import KINDS, Estimate, MatrixQuery, Query
+from app.queries import KINDS, MatrixQuery, Query
 from app.store.meshes import WrittenMesh
 from app.store.results import Result, ResultManifest
 from app.tracing import Period
@@ -120,12 +119,7 @@ class _Join(msgspec.Struct, frozen=True, tag="join"):
     result_name: str
 
 
-class _Estimate(msgspec.Struct, frozen=True, tag="estimate"):
-    query: _Query
-    representation: Representation
-
-
-_Work = _Store | _Run | _Part | _Join | _Estimate
+_Work = _Store | _Run | _Part | _Join
 
 
 class _Task(msgspec.Struct, frozen=True):
@@ -159,7 +153,6 @@ class _Done(msgspec.Struct, frozen=True, tag="done"):
     periods: dict[str, Period]
     mesh: _Mesh | None
     result: _Result | None
-    estimate: Estimate | None
 
 
 class _Refused(msgspec.Struct, frozen=True, tag="refused"):
@@ -220,7 +213,6 @@ class Wire:
                         dict(outcome.periods),
                         self._mesh_out(outcome.mesh),
                         _result_out(outcome.result),
-                        outcome.estimate,
                     )
                 )
             case Problem():
@@ -237,7 +229,6 @@ class Wire:
                     done.periods,
                     self._mesh_in(done.mesh),
                     _result_in(done.result),
-                    done.estimate,
                 )
             case _Refused(problem):
                 if problem.code not in CODES:
@@ -256,8 +247,6 @@ class Wire:
                 return _Part(_query_out(query), dtype, part, name)
             case JoinParts(query, dtype, parts, reached, name):
                 return _Join(_query_out(query), dtype, list(parts), reached, name)
-            case EstimateQuery(query, representation):
-                return _Estimate(_query_out(query), representation)
 
     def _work_in(self, work: _Work) -> Work:
         match work:
@@ -270,8 +259,6 @@ class Wire:
             case _Join(query, dtype, parts, reached, name):
                 names = tuple(map(_inside, parts))
                 return JoinParts(_matrix_in(query), dtype, names, reached, _inside(name))
-            case _Estimate(query, representation):
-                return EstimateQuery(_query_in(query), representation)
 
     def _input_out(self, given: MeshInput) -> _Sample | _File:
         match given:

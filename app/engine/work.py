@@ -7,7 +7,7 @@ from typing import Any
 
 from app.encoding import Representation
 from app.errors import Problem
-from app.queries import Estimate, MatrixQuery, Query
+from app.queries import MatrixQuery, Query
 from app.schemas.meshes import Merge
 from app.store.meshes import WrittenMesh
 from app.store.results import Result
@@ -80,18 +80,10 @@ class JoinParts:
     result_name: str
 
 
-@dataclass(frozen=True)
-class EstimateQuery:
-    """Estimate the cost of the answer to a query."""
-
-    query: Query[Any]
-    representation: Representation
-
-
 WritesResult = RunQuery | ComputePart | JoinParts
 """Work that ends with a result of a name: whoever else asks for it can wait for the same"""
 
-Work = StoreMesh | WritesResult | EstimateQuery
+Work = StoreMesh | WritesResult
 
 
 @dataclass(frozen=True)
@@ -119,7 +111,6 @@ class TaskResult:
     """Begin and end of each phase, for traces"""
     mesh: WrittenMesh | None = None
     result: Result | None = None
-    estimate: Estimate | None = None
 
 
 Outcome = TaskResult | Problem | None

@@ -20,7 +20,6 @@ from app.engine.priority import low_priority_thread
 from app.engine.signals import Signals
 from app.engine.work import (
     ComputePart,
-    EstimateQuery,
     JoinParts,
     MeshFromFile,
     MeshFromSample,
@@ -39,10 +38,9 @@ from app.queries import (
     Query,
     Unwritten,
     code_version,
-    estimate,
 )
 from app.queries.validation import check_json_size
-from app.settings import Settings, variable_of
+from app.settings import Settings
 from app.store.fields import FieldStore
 from app.store.lru_cache import LRUCache
 from app.store.meshes import MeshStore, OpenMesh
@@ -100,7 +98,7 @@ class Worker:
             return None
         except MemoryError as error:
             self._forget_all()  # caches count as well
-            limit, setting = self.settings.worker_memory_bytes, variable_of("worker_memory_bytes")
+            limit, setting = self.settings.worker_memory_bytes, "worker_memory_bytes"
             return replace(problem_of(error), limit=limit, setting=setting)
         except Exception as error:
             problem = problem_of(error)
@@ -133,8 +131,6 @@ class Worker:
                 return self._compute_part(work, clock, is_cancelled)
             case JoinParts():
                 return self._join_parts(work, clock, is_cancelled)
-            case EstimateQuery():
-                return self._estimate(work, clock, is_cancelled)
 
     def _store(self, work: StoreMesh, clock: "Clock", cancel: Callable[[], bool]) -> TaskResult:
         try:
@@ -235,15 +231,6 @@ class Worker:
             parts = work.query.parts(opened, work.dtype, cancel)
             made = self._matrix = _Matrix(opened, question, parts)
         return made.parts
-
-    def _estimate(
-        self, work: EstimateQuery, clock: "Clock", cancel: Callable[[], bool]
-    ) -> TaskResult:
-        with clock.phase("load"):
-            opened = self._open(work.query)
-        with clock.phase("compute"):
-            estimated = estimate(work.query, work.representation, opened, cancel)
-        return TaskResult(clock.seconds, clock.periods, estimate=estimated)
 
     def _write_fields(self, fields: Sequence[Unwritten]) -> None:
         self.fields.write(fields)

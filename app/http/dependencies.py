@@ -106,6 +106,13 @@ def job_after(prefer: str | None) -> int | None:
     return next((int(wait[1]) for wait in waits if wait), 0)
 
 
+def refuse_idempotency_key(request: Request) -> None:
+    """Refuse a key of a job in a request that makes none."""
+    if "idempotency-key" in request.headers:
+        detail = "Idempotency-Key goes with Prefer: respond-async only"
+        raise problem("idempotency_key_unused", detail)
+
+
 def require_json(request: Request) -> None:
     """Refuse a body whose media type is not JSON."""
     media_type = request.headers.get("content-type", "")

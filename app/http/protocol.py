@@ -196,7 +196,7 @@ class BoundedHttpProtocol(HttpToolsProtocol):
                 self.transport.close()
                 return
         request_id = uuid4().hex
-        response = problem_response(problem, "/", request_id)
+        response = problem_response(problem, "/", request_id, self.root_path)
         response.headers.update({**common_headers(request_id), "Connection": "close"})
         head = b"".join(b"%b: %b\r\n" % header for header in response.raw_headers)
         self.transport.write(STATUS_LINE[problem.status] + head + b"\r\n" + bytes(response.body))

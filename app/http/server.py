@@ -59,6 +59,7 @@ def server_of(app: FastAPI, host: str, port: int, settings: Settings) -> Drainin
         host,
         port,
         http=cast(Any, connect),
+        root_path=settings.root_path,
         ws="none",
         timeout_graceful_shutdown=math.ceil(settings.drain_s),  # uvicorn takes whole seconds
         log_config=None,

@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import Any, ClassVar, Generic, Self, TypeVar
-from uuid import uuid4
 
 import numpy as np
 import orjson
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 import geodesic_core as gc
 from app import __version__
 from app.encoding import JSON, NPY, OCTETS, Answer, Representation
-from app.queries.cost_model import PER_FACE_BLOCKED, Cost
+from app.queries.cost_model import PER_FACE_BLOCKED
 from app.queries.field_cache import FieldCache
 from app.queries.points import SurfacePoints, name_of, notes_on, resolve_points
 from app.queries.validation import (
@@ -74,17 +73,6 @@ class ExecutionContext:
             "progress": self.progress,
             "memory_limit": self.memory_limit,
         }
-
-
-@dataclass(frozen=True)
-class Forecast:
-    """The expected cost of an answer, and its expected size."""
-
-    cost: Cost
-    answer: Answer
-    """An answer of about the same size, mostly of straight distances instead of geodesic ones"""
-    times: float = 1.0
-    """The size of the real answer, as a multiple of that"""
 
 
 @dataclass(frozen=True)
@@ -152,11 +140,6 @@ class Query(ABC, Generic[R]):
     # What each kind defines
 
     @property
-    def is_repeatable(self) -> bool:
-        """Whether the answer is the same in every run."""
-        return True
-
-    @property
     def offers(self) -> Sequence[str]:
         """The media types of the answer."""
         return JSON, NPY, OCTETS
@@ -196,10 +179,6 @@ class Query(ABC, Generic[R]):
     @abstractmethod
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Compute the answer on an open mesh, for the resolved points."""
-
-    @abstractmethod
-    def forecast(self, opened: OpenMesh, points: SurfacePoints) -> Forecast:
-        """Return the expected cost of `solve`, without solving."""
 
     # What all kinds share
 
@@ -267,10 +246,9 @@ def code_version() -> str:
 def result_key(query: Query[Any], representation: Representation) -> str:
     """Return the name of the answer to ``query`` in a representation.
 
-    It is a hash, of the code that answers as well, unless the answer differs from run to run: then
-    each run has a name of its own.
+    It is a hash, of the code that answers as well.
     """
-    return _hash(query, representation, code_version()) if query.is_repeatable else uuid4().hex
+    return _hash(query, representation, code_version())
 
 
 def fingerprint(query: Query[Any], representation: Representation) -> str:

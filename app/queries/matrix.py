@@ -1,7 +1,6 @@
 """Distances from many points to many others."""
 
 import math
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -13,42 +12,27 @@ import geodesic_core as gc
 from app.encoding import CSV, JSON, NPY, NPZ, OCTETS, Answer, Representation
 from app.errors import over_limit
 from app.queries.accuracy import (
-    as_swept,
     bound_on,
-    method_of,
     options_of,
     with_default_accuracy,
 )
-from app.queries.base import VALUES_OF_POINT, ExecutionContext, Forecast, Query
-from app.queries.cost_model import (
-    PER_POINT,
-    SWEPT_FROM,
-    Cost,
-    rough_share,
-    search_cost,
-    share_within,
-    straight_along,
-    straight_between,
-    sweep_cost,
-    sweeps_cost,
-)
+from app.queries.base import VALUES_OF_POINT, ExecutionContext, Query
+from app.queries.cost_model import PER_POINT, share_reached, sweep_seconds
 from app.queries.points import SurfacePoints, components_of, describe_point, numbered
 from app.queries.validation import MeshSize, WrittenPoints, check_count, invalid_fields
 from app.queries.views import table_of_matrix, table_of_sparse
 from app.schemas.requests import Layout, MatrixRequest
-from app.settings import Settings, available_cores
+from app.settings import Settings
 from app.store.meshes import OpenMesh
 
 if TYPE_CHECKING:
-    from scipy.sparse import coo_array
+    pass
 
 _CELLS = "cells of the matrix"
 _IN_PARTS: Mapping[Layout, str] = {"dense": NPY, "sparse": NPZ}
 """Media types in which jobs compute a matrix of any size, by layout"""
 _INDEX_BYTES = 8
 """Bytes of an index in a sparse file: of the column of a distance, or of the end of a row"""
-_SAMPLED = 2**22
-"""Straight distances that are computed for an estimate, at most, about"""
 
 
 class MatrixQuery(Query[MatrixRequest]):
@@ -204,8 +188,8 @@ class MatrixQuery(Query[MatrixRequest]):
     def rough_seconds(self, size: MeshSize) -> float:
         """Return the cost of a sweep to the limit from each point of the smaller side."""
         count = self._count(size)
-        share = rough_share(size, 1, self.request.max_distance)
-        one = sweep_cost(size.faces, self.request, share).seconds
+        share = share_reached(size, 1, self.request.max_distance)
+        one = sweep_seconds(size.faces, self.request, share)
         return min(count) * one + PER_POINT * sum(count)
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
@@ -226,64 +210,6 @@ class MatrixQuery(Query[MatrixRequest]):
                 "limit_exceeded", _CELLS, found.nnz, context.max_cells, setting, hint=hint
             )
         return self._answer(opened, sources, targets, found)
-
-    def forecast(self, opened: OpenMesh, points: SurfacePoints) -> Forecast:
-        """Return the cost of sweeps, exact ones to the farthest target along a straight line.
-
-        Of a large matrix some sources stand for all.
-        """
-        mesh, limit = opened.mesh, self.request.max_distance
-        sources, targets = self._parted(mesh, points)
-        seconds, times = PER_POINT * len(points), 1.0
-        found: Any
-        if self.request.layout == "pairs":
-            found = straight_along(mesh, sources, targets, limit)
-            cost = self._cost_of_pairs(mesh, sources, targets, found)
-            table = found.nbytes
-        else:
-            count = len(sources)
-            sources = sources[:: 1 + (count * len(targets) - 1) // _SAMPLED]
-            times = count / len(sources)
-            found = straight_between(mesh, sources, targets, limit)
-            radii = _farthest(found if count <= len(targets) else found.T)
-            cost = self._cost_of_sweeps(mesh, np.resize(radii, min(count, len(targets))))
-            table = found.nbytes
-            if self.request.layout == "sparse":
-                found = _sparse(found)
-                table = found.nnz * 12
-        answer = self._answer(opened, sources, targets, found)
-        return Forecast(Cost(cost.seconds + seconds, cost.memory_bytes + table), answer, times)
-
-    def _cost_of_sweeps(self, mesh: gc.TriangleMesh, radii: NDArray[np.float64]) -> Cost:
-        """Return the cost of sweeps to these farthest targets, where only exact ones end."""
-        request = as_swept(self.request, mesh)
-        if request.method != "exact":
-            limit = request.max_distance
-            radii = np.full(len(radii), math.inf if limit is None else limit)
-        threads = min(available_cores(), len(radii))
-        shares = share_within(mesh, radii).tolist()
-        return sweeps_cost(len(mesh.faces), request, shares, threads)
-
-    def _cost_of_pairs(
-        self,
-        mesh: gc.TriangleMesh,
-        sources: SurfacePoints,
-        targets: SurfacePoints,
-        distances: NDArray[np.float64],
-    ) -> Cost:
-        """Return the cost of searches and of sweeps, these from the side with fewer points."""
-        swept_from = SWEPT_FROM if as_swept(self.request, mesh).method == "exact" else 1
-        ends = min(sources, targets, key=lambda side: len(set(side)))
-        pairs = Counter(ends)
-        searches = sum(count for count in pairs.values() if count < swept_from)
-        radii = {end: 0.0 for end, count in pairs.items() if count >= swept_from}
-        for end, distance in zip(ends, distances.tolist(), strict=True):
-            if end in radii and distance < math.inf:
-                radii[end] = max(radii[end], distance)
-        costs = [search_cost(len(mesh.faces), searches)] if searches else []
-        if radii:
-            costs.append(self._cost_of_sweeps(mesh, np.array(list(radii.values()))))
-        return Cost(sum(cost.seconds for cost in costs), sum(cost.memory_bytes for cost in costs))
 
     @cached_property
     def _is_symmetric(self) -> bool:
@@ -356,7 +282,7 @@ class MatrixQuery(Query[MatrixRequest]):
         return {
             "kind": self.kind,
             "mesh_id": self.mesh_id,
-            **method_of(self.request),
+            "method": self.request.method,
             "error_bound": bound_on(mesh, self.request),
             "layout": self.request.layout,
         }
@@ -381,17 +307,3 @@ def _describe_ends(
         {**describe_point(mesh, point), "component": component}
         for point, component in zip(points, components.tolist(), strict=True)
     ]
-
-
-def _sparse(table: NDArray[np.float64]) -> "coo_array":
-    """Return the finite distances of a matrix."""
-    from scipy.sparse import coo_array
-
-    cells = np.nonzero(np.isfinite(table))
-    return coo_array((table[cells], cells), shape=table.shape)
-
-
-def _farthest(distances: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the largest finite distance of each row, or 0."""
-    farthest: NDArray[np.float64] = np.where(np.isfinite(distances), distances, 0.0).max(axis=1)
-    return farthest

@@ -23,8 +23,8 @@ from functools import partial
 
 from app.engine.interface import Engine, ProgressCallback
 from app.engine.single_flight import SingleFlight
-from app.engine.work import EstimateQuery, RunQuery, Task, TaskResult
-from app.queries import Estimate, MatrixQuery, result_key
+from app.engine.work import RunQuery, Task, TaskResult
+from app.queries import MatrixQuery, result_key
 from app.service.matrix_parts import MatrixInParts
 from app.service.progress import ignore_progress
 from app.service.question import Question
@@ -74,20 +74,6 @@ class Answering:
                 result = await self._results.with_files(result)
             return result, seconds
 
-    async def estimate(
-        self, question: Question, deadline_s: float
-    ) -> tuple[Estimate, PhaseSeconds]:
-        """Have a worker, which has the mesh, estimate the cost of the answer to a question."""
-        query, representation = question.query, question.representation
-        query.check_answer(representation, question.size, self._settings, as_job=True)
-        work = EstimateQuery(query, representation)
-        task = Task(work, question.client, query.affinity_keys, is_small=True)
-        async with time_limit(self._settings, deadline_s):
-            with self._catalog.pinned(query.mesh_id):
-                done = await self.engine.run(task, ignore_progress)
-        assert done.estimate is not None, "this kind of work estimates"  # noqa: S101
-        return done.estimate, done.seconds
-
     async def find_or_compute(
         self, question: Question, on_progress: ProgressCallback, *, is_promised: bool = False
     ) -> Answered:
@@ -106,7 +92,7 @@ class Answering:
             counted = partial(self._run, run, query.kind)
             done = await self._flights.join(name, counted, on_progress, is_promised=is_promised)
             assert done.result is not None, "this kind of work answers"  # noqa: S101
-            result = self._results.add(done.result, is_reusable=query.is_repeatable)
+            result = self._results.add(done.result)
             return result, done.seconds
 
     def _computation(self, question: Question, *, is_promised: bool) -> tuple[str, _Run]:

@@ -34,6 +34,7 @@ from app.store.choice import store_of
 from app.store.fields import FieldStore
 from app.store.interface import Store
 from app.store.mesh_catalog import MeshCatalog
+from app.store.mesh_index import MeshIndex
 from app.store.ownership import Share
 from app.store.results import ResultStore
 from app.store.scratch import Scratch
@@ -68,6 +69,7 @@ class Service:
             quota=settings.quota_bytes,
             shared=MeshRecords(self.database) if self.database.is_shared else None,
         )
+        self.mesh_index = MeshIndex(self.store.meshes)
         self.results = ResultStore(
             self.store.results,
             settings.results_bytes,
@@ -218,14 +220,9 @@ class Service:
         return await self.store.meshes.array_file(mesh_id, name)
 
     async def size(self, mesh_id: str) -> MeshSize:
-        """Return the counts of a mesh that checks and estimates need."""
+        """Return the counts of a mesh that checks need."""
         report = (await self.store.meshes.manifest(mesh_id))["report"]
         return MeshSize(report["vertices"], report["faces"], report["mean_edge_length"])
-
-    async def list_meshes(self, limit: int, after: str) -> tuple[list[Manifest], str | None]:
-        """Return the manifests of ``limit`` meshes after an id, and the id to go on after."""
-        ids, more = await self.store.meshes.page(after, limit)
-        return await self.store.meshes.manifests(ids), ids[-1] if more else None
 
     async def delete_mesh(self, mesh_id: str, caller: Caller) -> None:
         """Remove a mesh and its results; afterwards no service that shares the store has it."""

@@ -18,8 +18,7 @@ import hashlib
 import os
 import re
 import zlib
-from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -133,7 +132,7 @@ class MeshStore:
             "id": mesh_id,
             "owner": owner,
             "name": name,
-            "created": datetime.now(UTC).isoformat(timespec="seconds"),
+            "created": datetime.now(UTC).isoformat(timespec="milliseconds"),
             "report": mesh.report.as_dict(),
             "warnings": list(mesh.warnings),
             "crc32": checksums,
@@ -269,11 +268,17 @@ class MeshStore:
             raise problem("not_found", detail)
         return self._verified(mesh_id, PUBLIC_ARRAYS[name])
 
-    def page(self, after: str, limit: int) -> tuple[list[str], bool]:
-        """Return the next ``limit`` ids after ``after``, in order, and whether more follow."""
-        ids = sorted(entry.name for entry in self.folder.iterdir())
-        first = bisect_right(ids, after)
-        return ids[first : first + limit], len(ids) > first + limit
+    def ids(self) -> list[str]:
+        """Return the ids of all meshes."""
+        return [entry.name for entry in self.folder.iterdir()]
+
+    def manifests(self, ids: Iterable[str]) -> list[Mapping[str, Any]]:
+        """Return the manifests of meshes, in their order, without those that cannot be read."""
+        found = []
+        for mesh_id in ids:
+            with suppress(ProblemError):
+                found.append(self.manifest(mesh_id))
+        return found
 
     def sizes(self) -> dict[str, int]:
         """Return the bytes of each mesh on disk, the least recently used first."""

@@ -20,7 +20,6 @@ from anyio import to_thread
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from app.errors import StoreUnavailableError, over_limit, problem
-from app.settings import variable_of
 from app.store.atomic import atomic_write, remove_partial
 from app.store.last_use import note_use, order_of_use
 from app.store.log import warn
@@ -429,7 +428,7 @@ class ResultStore:
                 "needs",
                 limit=self._capacity,
                 actual=self._capacity - room + nbytes,
-                setting=variable_of("results_bytes"),
+                setting="results_bytes",
                 hint=_MAKE_ROOM,
             )
 

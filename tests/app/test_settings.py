@@ -26,6 +26,7 @@ TEXTS = {
     "engine": ("ray", "ray"),
     "address": ("10.0.0.1:6379", "10.0.0.1:6379"),
     "cluster_token": ("a long secret of ours", SecretStr("a long secret of ours")),
+    "root_path": ("/geodesic", "/geodesic"),
     "log_format": ("json", "json"),
     "log_probes": ("on", "on"),
     "api_keys": ("", ()),

@@ -225,11 +225,11 @@ def test_openapi_declares_the_scheme(keyed: TestClient) -> None:
 def test_rate_limit(tmp_path: Path) -> None:
     client = limited(tmp_path, rate_limit=2)
 
-    assert client.get("/v1").json()["limits"]["GEODESIC_RATE_LIMIT"] == 2
+    assert client.get("/v1").json()["limits"]["rate_limit"] == 2
     assert client.get("/v1").status_code == 200
     response = client.get("/v1")
     problem = check_problem(response, 429, "rate_limited")
-    assert (problem["limit"], problem["setting"]) == (2, "GEODESIC_RATE_LIMIT")
+    assert (problem["limit"], problem["setting"]) == (2, "rate_limit")
     assert 1 <= int(response.headers["retry-after"]) <= 30
     for _ in range(5):
         assert client.get("/livez").status_code == 200
@@ -286,7 +286,7 @@ def test_requests_at_the_same_time(tmp_path: Path) -> None:
             response = client.get("/v1")
             problem = check_problem(response, 429, "rate_limited")
             assert (problem["limit"], problem["actual"]) == (1, 2)
-            assert problem["setting"] == "GEODESIC_MAX_CONCURRENT"
+            assert problem["setting"] == "max_concurrent"
             assert response.headers["retry-after"] == "1"
             assert client.get("/livez").status_code == 200
 

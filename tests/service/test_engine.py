@@ -225,7 +225,7 @@ def test_a_full_queue_refuses_at_once(
 
     problem = check_problem(response, 503, "queue_full")
     assert response.headers["retry-after"] == "1"
-    assert (problem["limit"], problem["setting"]) == (2, "GEODESIC_QUEUE_SIZE")
+    assert (problem["limit"], problem["setting"]) == (2, "queue_size")
     assert {future.result().status_code for future in (*running, *waiting)} == {200}
 
 
@@ -515,7 +515,7 @@ def test_the_server_s_own_deadline_names_its_setting(tmp_path: Path) -> None:
     response = client.post("/v1/meshes", params={"sample": "plane", "faces": 8})
 
     problem = check_problem(response, 504, "deadline_exceeded")
-    assert (problem["limit"], problem["setting"]) == (0.2, "GEODESIC_DEADLINE_S")
+    assert (problem["limit"], problem["setting"]) == (0.2, "deadline_s")
 
 
 def test_work_that_does_not_stop_is_killed(tmp_path: Path) -> None:

@@ -239,6 +239,18 @@ def test_jobs_that_are_not_there(one: ServiceClient, job_id: str) -> None:
         assert one.get(path).json()["code"] in ("job_not_found", "not_found")
 
 
+def test_a_key_where_no_job_is_made_is_refused(one: ServiceClient, small: str) -> None:
+    key = {"Idempotency-Key": "unused"}
+    body = {"sources": [{"vertex": 0}]}
+    for refused in (
+        one.post(f"/v1/meshes/{small}/distances", json=body, headers=key),
+        one.get(f"/v1/meshes/{small}/path?from=0&to=1", headers=key),
+        one.post("/v1/meshes?sample=plane", headers=key),
+    ):
+        problem = check_problem(refused, 400, "idempotency_key_unused")
+        assert "Prefer: respond-async" in problem["detail"]
+
+
 def test_jobs_are_listed_the_newest_first(one: ServiceClient, small: str) -> None:
     ids = [job_of(submit(one, small)).rpartition("/")[2] for _ in range(5)]
     found, cursor = [], None
@@ -416,7 +428,7 @@ def test_a_job_has_a_deadline_of_its_own(tmp_path: Path) -> None:
             problem = wait_for(client, job, "failed")["problem"]
 
         assert problem["code"] == "deadline_exceeded"
-        assert (problem["limit"], problem["setting"]) == (0.3, "GEODESIC_JOB_DEADLINE_S")
+        assert (problem["limit"], problem["setting"]) == (0.3, "job_deadline_s")
 
 
 def test_jobs_are_forgotten_after_a_while(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

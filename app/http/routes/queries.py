@@ -4,9 +4,8 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
-from pydantic import Field
 
-from app.encoding import CSV, GEOJSON, JSON, NPY, NPZ, OBJ, OCTETS, PLY, SVG
+from app.encoding import CSV, JSON, NPY, NPZ, OBJ, OCTETS, PLY
 from app.encoding.representation import ARRAYS, TEXTS
 from app.http.responses import FILE_HEADERS, QUERY_PROBLEMS, documented, problems
 from app.http.routes.query_request import QueryRequestDep
@@ -20,19 +19,20 @@ from app.queries import (
     NearestQuery,
     PathQuery,
     PathsQuery,
+    StepsQuery,
     naming_parameters,
     written_request,
 )
 from app.schemas.answers import (
     BordersAnswer,
     DistancesAnswer,
-    Estimate,
     IsolinesAnswer,
     LocateAnswer,
     MatrixAnswer,
     NearestAnswer,
     PathAnswer,
     PathsAnswer,
+    StepsAnswer,
 )
 from app.schemas.requests import (
     AnswerParameters,
@@ -42,16 +42,22 @@ from app.schemas.requests import (
     LocateRequest,
     MatrixRequest,
     NearestRequest,
-    PathAnswerParameters,
     PathParameters,
     PathRequest,
     PathsRequest,
+    StepsRequest,
 )
 from app.schemas.service import JobDocument
 
 router = APIRouter(prefix="/meshes/{mesh_id}", tags=["queries"], route_class=QueryRoute)
 
-_CODES = ("not_acceptable", *QUERY_PROBLEMS, "quota_exceeded", "range_not_satisfiable")
+_CODES = (
+    "idempotency_key_unused",
+    "not_acceptable",
+    *QUERY_PROBLEMS,
+    "quota_exceeded",
+    "range_not_satisfiable",
+)
 _BODY_CODES = ("malformed_body", "upload_too_large", "unsupported_media_type", *_CODES)
 
 
@@ -61,14 +67,14 @@ def _answers(model: type, description: str, *others: str) -> dict[int | str, dic
         ". In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` "
         "names what is too long for one"
     )
-    content = {name: {"schema": _schema(name)} for name in others}
+    content = {name: {"schema": _TEXT if name in TEXTS else _BINARY} for name in others}
     described = documented("Vary", "Server-Timing", *FILE_HEADERS)
     accepted = documented("Location", "Preference-Applied", "Cache-Control")
     if any(name in ARRAYS for name in others):
         described |= documented("Geodesic-Dtype", "Geodesic-Shape")
     return {
         200: {
-            "model": Annotated[model | Estimate, Field(discriminator="kind")],
+            "model": model,
             "content": content,
             "description": description,
             "headers": described,
@@ -88,14 +94,8 @@ def _answers(model: type, description: str, *others: str) -> dict[int | str, dic
 
 _TEXT = {"type": "string"}
 _BINARY = {"type": "string", "format": "binary"}
-_LINES = OBJ, CSV, SVG, GEOJSON
+_LINES = OBJ, CSV
 _PATH = "The path; its points in binary"
-
-
-def _schema(media_type: str) -> dict[str, str]:
-    if media_type == GEOJSON:
-        return {"$ref": "#/components/schemas/FeatureCollection"}
-    return _TEXT if media_type in TEXTS else _BINARY
 
 
 def _posted(name: str, summary: str, answers: Mapping[int | str, Any]) -> dict[str, Any]:
@@ -143,21 +143,16 @@ async def compute_distances(
     ),
 )
 async def compute_path(
-    body: PathRequest,
-    parameters: Annotated[PathAnswerParameters, Query()],
-    query_request: QueryRequestDep,
+    body: PathRequest, parameters: Parameters, query_request: QueryRequestDep
 ) -> Response:
     """Return the points of the path, from source to target, and the faces it crosses."""
-    explain = body.explain or parameters.explain
-    return await query_request.answer(
-        PathQuery, body.model_copy(update={"explain": explain}), parameters
-    )
+    return await query_request.answer(PathQuery, body, parameters)
 
 
 @router.get(
     "/path",
     operation_id="getPath",
-    summary="The shortest path between two points, cacheable",
+    summary="The shortest path between two points, as a link",
     response_class=Response,
     responses={
         **_answers(PathAnswer, _PATH, NPY, OCTETS, *_LINES),
@@ -173,7 +168,25 @@ async def get_path(
 ) -> Response:
     """Return the same as `POST`, for points written as `12`, `v12` or `f7:0.2,0.3,0.5`."""
     with naming_parameters():
-        return await query_request.answer(PathQuery, written_request(parameters), parameters)
+        body = written_request(parameters)
+        return await query_request.answer(
+            PathQuery, body, AnswerParameters(format=parameters.format)
+        )
+
+
+@router.post(
+    "/path/steps",
+    **_posted(
+        "computePathSteps",
+        "The steps of the search for a path",
+        _answers(StepsAnswer, "The steps, in order"),
+    ),
+)
+async def compute_path_steps(
+    body: StepsRequest, parameters: Parameters, query_request: QueryRequestDep
+) -> Response:
+    """Return what the search does to find the exact path: the faces that each step visits."""
+    return await query_request.answer(StepsQuery, body, parameters)
 
 
 @router.post(
@@ -256,7 +269,7 @@ async def compute_matrix(
     **_posted(
         "findNearest",
         "The candidates that are nearest to a point along the surface",
-        _answers(NearestAnswer, "The candidates, nearest first", CSV, GEOJSON),
+        _answers(NearestAnswer, "The candidates, nearest first", CSV),
     ),
 )
 async def find_nearest(
@@ -271,7 +284,7 @@ async def find_nearest(
     **_posted(
         "locatePoints",
         "The points of the surface that are nearest to positions",
-        _answers(LocateAnswer, "The points, in the order of the positions", CSV, GEOJSON),
+        _answers(LocateAnswer, "The points, in the order of the positions", CSV),
     ),
 )
 async def locate_points(

@@ -15,16 +15,17 @@ from app.http.dependencies import (
     job_after,
     negotiated,
     note_work,
+    refuse_idempotency_key,
     service_of,
     while_connected,
 )
 from app.http.large_bodies import LARGE, large_bodies_of
+from app.http.prefix import prefix_of
 from app.http.responses import (
     CACHED,
     NEGOTIATED,
     UNSTORED,
     accepted_response,
-    estimate_response,
     etag_of,
     not_modified,
     result_response,
@@ -71,7 +72,7 @@ class QueryRequest:
     async def answer(
         self, kind: type[Query[Any]], body: Any, parameters: AnswerParameters
     ) -> Response:
-        """Validate the query in ``body``, and respond with its answer, an estimate or a job."""
+        """Validate the query in ``body``, and respond with its answer or a job."""
         request, context = self.request, self.context
         service = service_of(request)
         size = await service.size(self.mesh_id)
@@ -85,15 +86,11 @@ class QueryRequest:
         representation = negotiated(request, parameters, query.offers)
         media_type = representation.media_type
         question = Question(query, size, representation, context.caller.name)
-        if parameters.estimate:
-            estimating = service.answering.estimate(question, context.deadline_s)
-            estimate, seconds = await while_connected(request, estimating)
-            note_work(request, self.mesh_id, seconds)
-            return estimate_response(self.mesh_id, estimate, media_type, seconds)
         wait_s, key = self.job_after_s, self.idempotency_key
         if wait_s == 0:
-            return accepted_response(await service.query_jobs.submit(question, context, key))
-        is_cacheable = request.method == "GET" and query.is_repeatable
+            job = await service.query_jobs.submit(question, context, key)
+            return accepted_response(job, prefix_of(request.scope))
+        is_cacheable = request.method == "GET"
         headers = {**NEGOTIATED, **(CACHED if is_cacheable else UNSTORED)}
         if is_cacheable:
             etag = etag_of(result_key(query, representation))
@@ -110,7 +107,7 @@ class QueryRequest:
             )
         answer = await while_connected(request, answering)
         if isinstance(answer, Job):
-            return accepted_response(answer)
+            return accepted_response(answer, prefix_of(request.scope))
         result, seconds = answer
         note_work(request, self.mesh_id, seconds)
         return result_response(request, result, seconds, media_type, service.results, headers)
@@ -132,7 +129,7 @@ class QueryHeaders(TimeoutHeader):
         min_length=1,
         max_length=255,
         description="Freely chosen key of a job: a request that is sent again with the same key "
-        "gets the same job",
+        "gets the same job. With `Prefer: respond-async` only",
     )
 
 
@@ -141,6 +138,8 @@ async def get_query_request(
 ) -> QueryRequest:
     """Return the request for a query, as a dependency."""
     context, job_after_s = context_of(request, headers), job_after(headers.prefer)
+    if job_after_s is None:
+        refuse_idempotency_key(request)
     return QueryRequest(mesh_id, request, context, job_after_s, headers.idempotency_key)
 
 

@@ -11,7 +11,6 @@ from scipy.sparse import load_npz
 
 from app.encoding import (
     CSV,
-    GEOJSON,
     JSON,
     NPY,
     NPZ,
@@ -26,7 +25,7 @@ from app.encoding import (
     encode,
     negotiate,
 )
-from app.encoding.colours import hex_colour
+from app.encoding.colours import colours_of
 from app.queries.views import table_of_matrix, table_of_sparse
 
 ANSWER = Answer(
@@ -175,7 +174,7 @@ def test_large_matrices_become_rows_one_after_the_other(table: Table) -> None:
 
 def size_and_peak(answer: Answer, form: Representation) -> tuple[int, int]:
     """Return how many bytes an answer has, and how many are in memory at most."""
-    hex_colour(0.0)  # imports the colour map, whose memory is not the answer's
+    colours_of(np.zeros(1), 1.0)  # imports the colour map, whose memory is not the answer's
     tracemalloc.start()
     try:
         size = sum(map(len, encode(answer, form).parts))
@@ -186,9 +185,9 @@ def size_and_peak(answer: Answer, form: Representation) -> tuple[int, int]:
 
 def test_members_are_headers_where_they_are_short() -> None:
     answer = Answer({"points": [1] * 10**6, "status": "ok", "warnings": []}, shown=("points",))
-    answer = replace(answer, points=list)
+    answer = replace(answer, lines=list)
 
-    assert encode(answer, Representation(GEOJSON)).headers == {
+    assert encode(answer, Representation(OBJ)).headers == {
         "Geodesic-Status": "ok",
         "Geodesic-Warnings": "[]",
     }

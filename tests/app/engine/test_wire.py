@@ -17,7 +17,6 @@ from app.engine import wire
 from app.engine.wire import DamagedMessageError, Message, VersionError, Wire, WireError
 from app.engine.work import (
     ComputePart,
-    EstimateQuery,
     JoinParts,
     MeshFromFile,
     MeshFromSample,
@@ -29,7 +28,7 @@ from app.engine.work import (
     Work,
 )
 from app.errors import Fault, Problem
-from app.queries import KINDS, Estimate, MatrixQuery, Query
+from app.queries import KINDS, MatrixQuery, Query
 from app.store.meshes import WrittenMesh
 from app.store.results import Result, ResultManifest
 from app.tracing import Period
@@ -40,6 +39,7 @@ VERTEX = {"vertex": 3}
 REQUESTS: dict[str, dict[str, Any]] = {
     "distances": {"sources": [VERTEX | {"start_distance": 0.1}], "barriers": [1, 2]},
     "path": {"source": VERTEX, "target": {"face": 7, "barycentric": [0.2, 0.3, 0.5]}},
+    "steps": {"source": VERTEX, "target": VERTEX, "waypoints": [VERTEX]},
     "paths": {"source": VERTEX, "targets": [{"edge": [0, 1], "t": 1 / 3}]},
     "isolines": {"sources": [{"polyline": [VERTEX, {"vertex": 4}]}], "levels": [1e-300, 0.1]},
     "borders": {"sources": [VERTEX, {"vertex": 4}], "chord_error": 0.01},
@@ -64,10 +64,10 @@ def returned(outcome: Outcome) -> Outcome:
 
 @pytest.mark.parametrize("query", QUERIES, ids=lambda query: query.kind)
 def test_queries_of_each_kind_arrive(query: Query[Any]) -> None:
-    for work in (RunQuery(query, FORM, f"{MESH_ID}/key"), EstimateQuery(query, FORM)):
-        task = Task(work, "alice", query.affinity_keys, is_small=True, is_promised=True)
+    work = RunQuery(query, FORM, f"{MESH_ID}/key")
+    task = Task(work, "alice", query.affinity_keys, is_small=True, is_promised=True)
 
-        assert sent(task) == task
+    assert sent(task) == task
 
 
 def test_parts_of_matrices_arrive() -> None:
@@ -116,7 +116,6 @@ def test_uploads_arrive_under_the_paths_of_the_other_machine(where: type) -> Non
                 is_reusable=False,
             ),
         ),
-        TaskResult({}, estimate=Estimate(0.1, 2**40, 17)),
         TaskResult({}, mesh=WrittenMesh({"id": MESH_ID, "report": {"ids": [1, [2, 3]]}}, None)),
         Problem(
             "invalid_mesh",
@@ -236,12 +235,12 @@ def test_the_name_of_a_result_that_returns_stays_in_the_store() -> None:
 
 def test_unknown_kinds_and_codes_are_refused() -> None:
     query = wire._Query("areas", MESH_ID, b"{}")
-    task = wire._Task(wire._Estimate(query, FORM), "alice", (), False, False, {})
+    task = wire._Task(wire._Run(query, FORM, "id/key"), "alice", (), False, False, {})
     with pytest.raises(DamagedMessageError, match="no kind of query 'areas'"):
         Wire(HERE).decode_task(wire.encode(task))
 
     query = wire._Query("distances", MESH_ID, b'{"sources": []}')
-    task = wire._Task(wire._Estimate(query, FORM), "alice", (), False, False, {})
+    task = wire._Task(wire._Run(query, FORM, "id/key"), "alice", (), False, False, {})
     with pytest.raises(DamagedMessageError, match="cannot be read"):
         Wire(HERE).decode_task(wire.encode(task))
 

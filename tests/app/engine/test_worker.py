@@ -177,7 +177,7 @@ def test_caches_are_emptied_where_memory_runs_out(
         problem = outcome_of(worker, distances_query(mesh_id))
 
     assert isinstance(problem, Problem)
-    assert (problem.code, problem.setting) == ("memory_limit", "GEODESIC_WORKER_MEMORY_BYTES")
+    assert (problem.code, problem.setting) == ("memory_limit", "worker_memory_bytes")
     assert worker.fields.nbytes == 0
     assert opened == [mesh_id]
     assert code_of(worker, distances_query(mesh_id)) is None

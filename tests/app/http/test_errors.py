@@ -17,7 +17,7 @@ from geodesic_core import errors as core
 from tests.support.service import check_problem
 
 CONTRACT = {
-    400: {"malformed_body", "malformed_request"},
+    400: {"malformed_body", "malformed_request", "idempotency_key_unused"},
     401: {"unauthorized"},
     403: {"forbidden", "origin_not_allowed"},
     404: {"mesh_not_found", "job_not_found", "not_found"},
@@ -112,9 +112,9 @@ def test_invalid_mesh_names_its_elements() -> None:
 @pytest.mark.parametrize(
     ("error", "setting"),
     [
-        (core.TooManyFaces(9, 7), "GEODESIC_MAX_FACES"),
-        (core.TooManyVertices(9, 7), "GEODESIC_MAX_VERTICES"),
-        (core.MemoryLimitExceeded(9, 7), "GEODESIC_QUERY_MEMORY_BYTES"),
+        (core.TooManyFaces(9, 7), "max_faces"),
+        (core.TooManyVertices(9, 7), "max_vertices"),
+        (core.MemoryLimitExceeded(9, 7), "query_memory_bytes"),
     ],
 )
 def test_limits_are_named(error: Exception, setting: str) -> None:

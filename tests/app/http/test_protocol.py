@@ -326,11 +326,11 @@ def test_connections_are_limited_altogether_and_for_each_caller(tmp_path: Path) 
     with listening(few) as listener:
         refused = check_each(listener, 2, 429, "rate_limited")
         assert refused["limit"] == 2
-        assert refused["setting"] == "GEODESIC_MAX_CALLER_CONNECTIONS"
+        assert refused["setting"] == "max_caller_connections"
     all_alike = Settings(store=tmp_path, max_connections=3, max_caller_connections=3)
     with listening(all_alike) as listener:
         refused = check_each(listener, 3, 503, "too_many_connections")
-        assert refused["setting"] == "GEODESIC_MAX_CONNECTIONS"
+        assert refused["setting"] == "max_connections"
 
 
 def check_each(listener: Listener, limit: int, status: int, code: str) -> dict[str, object]:

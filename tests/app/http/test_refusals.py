@@ -38,7 +38,7 @@ def errors_of(model: type[BaseModel], body: dict[str, Any]) -> list[Any]:
 
 
 def test_all_lists_of_all_queries_are_tested() -> None:
-    assert len(LISTS) == 21
+    assert len(LISTS) == 23
 
 
 @pytest.mark.parametrize(("model", "name"), LISTS)
@@ -118,7 +118,7 @@ def test_a_body_of_more_values_is_not_parsed(count: int, monkeypatch: pytest.Mon
         read(DISTANCES, {}, with_sources(count), SETTINGS)
     problem = refused.value.problem
     assert (problem.code, problem.actual, problem.limit) == ("limit_exceeded", count, MOST_VALUES)
-    assert problem.setting == "GEODESIC_MAX_QUERY_BYTES"
+    assert problem.setting == "max_query_bytes"
 
 
 @pytest.mark.parametrize("most_bytes", [1_000, 2**16, 2**18])

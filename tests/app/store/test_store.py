@@ -276,7 +276,7 @@ def test_what_finds_no_room_is_refused_and_leaves_nothing(tmp_path: Path) -> Non
         problem = caught.value.problem
         assert problem.code == "storage_full"
         assert (problem.limit, problem.actual) == (first + second - 1, first + second)
-        assert problem.setting == "GEODESIC_STORE_BYTES"
+        assert problem.setting == "store_bytes"
         assert files_in(tmp_path / "store") == before
         assert add(store, plane(50)) == (mesh_id, CatalogChange(is_new=False)), "it takes no room"
         anyio.run(store[1].delete, mesh_id)
@@ -324,7 +324,7 @@ def check_quota(store: Store, mesh_id: str, owner: str | None, wanted: int, quot
     problem = caught.value.problem
     assert (problem.code, problem.status) == ("quota_exceeded", 507)
     assert (problem.limit, problem.actual) == (quota, wanted)
-    assert problem.setting == "GEODESIC_QUOTA_BYTES"
+    assert problem.setting == "quota_bytes"
     assert files_in(store[0].folder) == before
 
     assert add(store, plane(50), owner) == (mesh_id, CatalogChange(is_new=False))
@@ -472,7 +472,7 @@ def test_over_http(tmp_path: Path) -> None:
         upload_sample(client, "plane", 72)
         sample = {"sample": "plane", "faces": 32}
         problem = check_problem(client.post("/v1/meshes", params=sample), 507, "storage_full")
-        assert (problem["limit"], problem["setting"]) == (room, "GEODESIC_STORE_BYTES")
+        assert (problem["limit"], problem["setting"]) == (room, "store_bytes")
         assert problem["actual"] > room
         assert files_in(store / "tmp") == set()
         assert distances(client, first).status_code == 200, "as is used after the other"

@@ -423,7 +423,7 @@ def test_room_is_reserved_among_pinned_results(tmp_path: Path) -> None:
             pass
         problem = refused.value.problem
         assert (problem.code, problem.limit, problem.actual) == ("storage_full", 100, 101)
-        assert problem.setting == "GEODESIC_RESULTS_BYTES"
+        assert problem.setting == "results_bytes"
         with store.reserving(None, 0) as reserve:
             reserve(6)
             reserve(4)
@@ -447,7 +447,7 @@ def test_the_answers_of_one_owner_s_jobs_leave_room_for_others(tmp_path: Path) -
     problem = refused.value.problem
     assert (problem.code, problem.status) == ("quota_exceeded", 507)
     assert (problem.limit, problem.actual) == (50, 60)
-    assert problem.setting == "GEODESIC_QUOTA_RESULTS_BYTES"
+    assert problem.setting == "quota_results_bytes"
     with store.reserving("alice", 20):
         with pytest.raises(ProblemError):
             store.refuse_without_room("alice", 1)
