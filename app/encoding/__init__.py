@@ -20,7 +20,7 @@ from app.encoding.representation import (
     PLY,
     Representation,
 )
-from app.encoding.views import Indices, Line, Surface, Table
+from app.encoding.views import Elements, Indices, Line, Surface, Table
 
 __all__ = [
     "CSV",
@@ -32,6 +32,7 @@ __all__ = [
     "OCTETS",
     "PLY",
     "Answer",
+    "Elements",
     "Encoded",
     "Indices",
     "Line",

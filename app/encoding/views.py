@@ -32,6 +32,24 @@ class Indices:
         return [None if i < 0 else i for i in self.array.tolist()]
 
 
+class Elements:
+    """The elements of a list, made some at a time, and only for a format that shows them."""
+
+    def __init__(self, count: int, made: Callable[[slice], list[Any]]) -> None:
+        self._count = count
+        self._made = made
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, part: slice) -> list[Any]:
+        return self._made(part)
+
+    def tolist(self) -> list[Any]:
+        """Return all elements."""
+        return self._made(slice(None))
+
+
 Values = NDArray[Any] | Indices
 Column = Values | range
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import geodesic_core as gc
-from app.encoding import CSV, JSON, NPY, NPZ, OCTETS, Answer, Representation
+from app.encoding import CSV, JSON, NPY, NPZ, OCTETS, Answer, Elements, Representation
 from app.errors import over_limit
 from app.queries.accuracy import (
     bound_on,
@@ -131,12 +132,12 @@ class MatrixQuery(Query[MatrixRequest]):
     def parts(self, opened: OpenMesh, dtype: Any, cancel: Callable[[], bool]) -> gc.MatrixParts:
         """Return the parts of the matrix, which are still to be computed."""
         mesh, request = opened.mesh, self.request
-        sources, targets = self._parted(mesh, self.resolved(mesh, cancel))
+        sources, targets = self._sides(mesh, self.resolved(mesh, cancel))
         assert request.layout != "pairs", "pairs are in memory"  # noqa: S101
         return gc.MatrixParts(
             mesh,
-            sources,
-            targets,
+            sources.given,
+            None if self._is_symmetric else targets.given,
             layout=request.layout,
             **options_of(request),
             max_distance=request.max_distance,
@@ -151,9 +152,7 @@ class MatrixQuery(Query[MatrixRequest]):
         """
         mesh = opened.mesh
         points = self.resolved(mesh, cancel)
-        sources, targets = self._parted(mesh, points)
-        ends = components_of(mesh, sources), components_of(mesh, targets)
-        unreachable = self._unreachable(*ends, reached)
+        unreachable = self._unreachable(*self._sides(mesh, points), reached)
         warnings = self.noted(opened, points).warnings
         return Answer(self._about(mesh) | {"unreachable": unreachable, "warnings": warnings})
 
@@ -169,22 +168,6 @@ class MatrixQuery(Query[MatrixRequest]):
             if points != "all":
                 yield from numbered(f"/{name}", points)
 
-    def resolved(self, mesh: gc.TriangleMesh, cancel: Callable[[], bool]) -> SurfacePoints:
-        """Return the sources, then the targets; raises as `resolve_points`."""
-        written = super().resolved(mesh, cancel)
-        before, after = (each == "all" for each in (self.request.sources, self.request.targets))
-        if self._is_symmetric and not before:
-            return [*written, *written]
-        if not (before or after):
-            return written
-        everywhere = [mesh.point(vertex) for vertex in range(len(mesh.vertices))]
-        return [*(everywhere if before else ()), *written, *(everywhere if after else ())]
-
-    def noted(self, opened: OpenMesh, points: SurfacePoints) -> OpenMesh:
-        """Return a mesh whose warnings also tell of points that were written one by one."""
-        before = len(opened.mesh.vertices) if self.request.sources == "all" else 0
-        return super().noted(opened, points[before:])
-
     def rough_seconds(self, size: MeshSize) -> float:
         """Return the cost of a sweep to the limit from each point of the smaller side."""
         count = self._count(size)
@@ -194,11 +177,12 @@ class MatrixQuery(Query[MatrixRequest]):
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep from the smaller side."""
-        sources, targets = self._parted(opened.mesh, points)
+        sources, targets = self._sides(opened.mesh, points)
         request = self.request
+        is_half = self._is_symmetric and request.layout != "pairs"
         found: Any = opened.solver.distance_matrix(
-            sources,
-            targets,
+            sources.given,
+            None if is_half else targets.given,
             request.max_distance,
             request.layout,
             **options_of(request),
@@ -243,22 +227,24 @@ class MatrixQuery(Query[MatrixRequest]):
         sources, targets = self._count(size)
         return sources if self.request.layout == "pairs" else sources * targets
 
-    def _parted(
-        self, mesh: gc.TriangleMesh, points: SurfacePoints
-    ) -> tuple[SurfacePoints, SurfacePoints]:
-        sources = self.request.sources
-        count = len(mesh.vertices) if sources == "all" else len(sources)
-        return points[:count], points[count:]
+    def _sides(self, mesh: gc.TriangleMesh, written: SurfacePoints) -> "tuple[_Side, _Side]":
+        """Return the sources and the targets, of which some were written one by one."""
+        request = self.request
+        if request.sources == "all":
+            sources, rest = _Side(mesh, None), written
+        else:
+            count = len(request.sources)
+            sources, rest = _Side(mesh, written[:count]), written[count:]
+        if self._is_symmetric:
+            return sources, sources
+        return sources, _Side(mesh, None if request.targets == "all" else rest)
 
-    def _answer(
-        self, opened: OpenMesh, sources: SurfacePoints, targets: SurfacePoints, found: Any
-    ) -> Answer:
-        mesh, layout = opened.mesh, self.request.layout
-        starts, ends = components_of(mesh, sources), components_of(mesh, targets)
+    def _answer(self, opened: OpenMesh, sources: "_Side", targets: "_Side", found: Any) -> Answer:
+        layout = self.request.layout
         members: dict[str, Any] = {
-            **self._about(mesh),
-            "sources": _describe_ends(mesh, sources, starts),
-            "targets": _describe_ends(mesh, targets, ends),
+            **self._about(opened.mesh),
+            "sources": Elements(len(sources), sources.described),
+            "targets": Elements(len(targets), targets.described),
         }
         arrays: tuple[str, ...] = ("distances",)
         if layout == "sparse":
@@ -271,7 +257,7 @@ class MatrixQuery(Query[MatrixRequest]):
             table = table_of_matrix(found)
         members |= {
             "distances": found,
-            "unreachable": self._unreachable(starts, ends, int(np.isfinite(found).sum())),
+            "unreachable": self._unreachable(sources, targets, int(np.isfinite(found).sum())),
             "warnings": opened.warnings,
         }
         points = len(sources) + len(targets)
@@ -287,10 +273,9 @@ class MatrixQuery(Query[MatrixRequest]):
             "layout": self.request.layout,
         }
 
-    def _unreachable(
-        self, starts: NDArray[np.int64], ends: NDArray[np.int64], reached: int
-    ) -> dict[str, int]:
-        """Return the number of missing distances by reason, from the components of both sides."""
+    def _unreachable(self, sources: "_Side", targets: "_Side", reached: int) -> dict[str, int]:
+        """Return the number of missing distances by reason."""
+        starts, ends = sources.components, targets.components
         if self.request.layout == "pairs":
             cells, connected = len(starts), int(np.count_nonzero(starts == ends))
         else:
@@ -300,10 +285,45 @@ class MatrixQuery(Query[MatrixRequest]):
         return {"disconnected": cells - connected, "beyond_max_distance": connected - reached}
 
 
-def _describe_ends(
-    mesh: gc.TriangleMesh, points: SurfacePoints, components: NDArray[np.int64]
-) -> Sequence[Mapping[str, Any]]:
-    return [
-        {**describe_point(mesh, point), "component": component}
-        for point, component in zip(points, components.tolist(), strict=True)
-    ]
+@dataclass(frozen=True)
+class _Side:
+    """The points on one side of a matrix: all vertices, or those that were written one by one.
+
+    There is no object for each vertex: many would take longer than the sweeps.
+    """
+
+    mesh: gc.TriangleMesh
+    points: SurfacePoints | None
+    """None for all vertices"""
+
+    def __len__(self) -> int:
+        return len(self.mesh.vertices) if self.points is None else len(self.points)
+
+    @property
+    def given(self) -> Sequence[int | gc.SurfacePoint]:
+        """The points, as the library takes them."""
+        return range(len(self.mesh.vertices)) if self.points is None else self.points
+
+    @cached_property
+    def components(self) -> NDArray[np.int64]:
+        """The connected component of each point."""
+        if self.points is None:
+            return self.mesh.components.astype(np.int64)
+        return components_of(self.mesh, self.points)
+
+    def described(self, part: slice) -> list[dict[str, Any]]:
+        """Return the members of some of the points."""
+        components = self.components[part].tolist()
+        if self.points is not None:
+            described = [describe_point(self.mesh, point) for point in self.points[part]]
+        else:
+            indices = range(len(self))[part]
+            positions = self.mesh.vertices[part].tolist()
+            described = [
+                {"vertex": vertex, "position": position}
+                for vertex, position in zip(indices, positions, strict=True)
+            ]
+        return [
+            {**point, "component": component}
+            for point, component in zip(described, components, strict=True)
+        ]
