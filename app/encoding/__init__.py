@@ -5,7 +5,7 @@ An `Answer` is a JSON object whose members may be arrays. It also has views for 
 so that no answer is in memory as a whole twice.
 """
 
-from app.encoding.answer import Answer, Encoded
+from app.encoding.answer import Answer
 from app.encoding.arrays import array_headers, npy_parts, too_large_for
 from app.encoding.negotiation import coding_quality, negotiate, negotiate_coding
 from app.encoding.registry import encode
@@ -33,7 +33,6 @@ __all__ = [
     "PLY",
     "Answer",
     "Elements",
-    "Encoded",
     "Indices",
     "Line",
     "Representation",

@@ -1,7 +1,7 @@
 """Answers of queries, and encoded answers."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from app.encoding.views import Line, Surface, Table
@@ -39,9 +39,5 @@ class Answer:
     surface: Surface | None = None
 
 
-@dataclass(frozen=True)
-class Encoded:
-    """The parts of a body, made one after the other, and its headers."""
-
-    parts: Iterable[Buffer]
-    headers: Mapping[str, str] = field(default_factory=dict)
+Encoded = tuple[Iterable[Buffer], Mapping[str, str]]
+"""The parts of a body, made one after the other, and the headers that its content gives"""

@@ -1,7 +1,6 @@
 """The encoder of each media type."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import partial
 
 from app.encoding.answer import Answer, Encoded
@@ -40,6 +39,6 @@ def encode(answer: Answer, representation: Representation) -> Encoded:
     encoder = _ENCODERS[representation.media_type]
     if representation.media_type in ARRAYS:
         encoder = partial(encoder, dtype=representation.dtype)
-    encoded = encoder(answer)
-    encoded = replace(encoded, parts=joined(encoded.parts))
+    parts, headers = encoder(answer)
+    encoded = joined(parts), headers
     return encoded if representation.coding is None else compressed(encoded, representation.coding)

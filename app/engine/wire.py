@@ -96,24 +96,22 @@ class _Query(msgspec.Struct, frozen=True):
     mesh_id: str
     request: bytes
     """As JSON, see `Query.written`"""
+    representation: Representation
 
 
 class _Run(msgspec.Struct, frozen=True, tag="run"):
     query: _Query
-    representation: Representation
     result_name: str
 
 
 class _Part(msgspec.Struct, frozen=True, tag="part"):
     query: _Query
-    dtype: str
     part: int
     result_name: str
 
 
 class _Join(msgspec.Struct, frozen=True, tag="join"):
     query: _Query
-    dtype: str
     parts: Sequence[str]
     reached: int
     result_name: str
@@ -241,24 +239,24 @@ class Wire:
         match work:
             case StoreMesh(mesh_input, folder, owner, name):
                 return _Store(self._input_out(mesh_input), self._path_out(folder), owner, name)
-            case RunQuery(query, representation, name):
-                return _Run(_query_out(query), representation, name)
-            case ComputePart(query, dtype, part, name):
-                return _Part(_query_out(query), dtype, part, name)
-            case JoinParts(query, dtype, parts, reached, name):
-                return _Join(_query_out(query), dtype, list(parts), reached, name)
+            case RunQuery(query, name):
+                return _Run(_query_out(query), name)
+            case ComputePart(query, part, name):
+                return _Part(_query_out(query), part, name)
+            case JoinParts(query, parts, reached, name):
+                return _Join(_query_out(query), list(parts), reached, name)
 
     def _work_in(self, work: _Work) -> Work:
         match work:
             case _Store(mesh_input, folder, owner, name):
                 return StoreMesh(self._input_in(mesh_input), self._path_in(folder), owner, name)
-            case _Run(query, representation, name):
-                return RunQuery(_query_in(query), representation, _inside(name))
-            case _Part(query, dtype, part, name):
-                return ComputePart(_matrix_in(query), dtype, part, _inside(name))
-            case _Join(query, dtype, parts, reached, name):
+            case _Run(query, name):
+                return RunQuery(_query_in(query), _inside(name))
+            case _Part(query, part, name):
+                return ComputePart(_matrix_in(query), part, _inside(name))
+            case _Join(query, parts, reached, name):
                 names = tuple(map(_inside, parts))
-                return JoinParts(_matrix_in(query), dtype, names, reached, _inside(name))
+                return JoinParts(_matrix_in(query), names, reached, _inside(name))
 
     def _input_out(self, given: MeshInput) -> _Sample | _File:
         match given:
@@ -337,7 +335,7 @@ def _inside(path: str) -> str:
 
 
 def _query_out(query: Query[Any]) -> _Query:
-    return _Query(query.kind, query.mesh_id, query.written)
+    return _Query(query.kind, query.mesh_id, query.written, query.representation)
 
 
 def _query_in(query: _Query) -> Query[Any]:
@@ -345,7 +343,8 @@ def _query_in(query: _Query) -> Query[Any]:
     if kind is None:
         raise DamagedMessageError(f"there is no kind of query {query.kind!r}")
     try:
-        return kind(_inside(query.mesh_id), kind.model.model_validate_json(query.request))
+        request = kind.model.model_validate_json(query.request)
+        return kind(_inside(query.mesh_id), request, representation=query.representation)
     except ValueError as error:
         raise DamagedMessageError(f"the query of kind {query.kind} cannot be read") from error
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from app.encoding import Representation
 from app.errors import Problem
 from app.queries import MatrixQuery, Query
 from app.schemas.meshes import Merge
@@ -53,7 +52,6 @@ class RunQuery:
     """Answer a query, and write the answer as the result ``result_name``."""
 
     query: Query[Any]
-    representation: Representation
     result_name: str
 
 
@@ -62,7 +60,6 @@ class ComputePart:
     """Compute a part of a large matrix, and write it as the result ``result_name``."""
 
     query: MatrixQuery
-    dtype: str
     part: int
     result_name: str
 
@@ -72,7 +69,6 @@ class JoinParts:
     """Write a large matrix, whose parts are results, as the result ``result_name``."""
 
     query: MatrixQuery
-    dtype: str
     parts: Sequence[str]
     """Names of their results"""
     reached: int

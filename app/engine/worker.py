@@ -161,15 +161,15 @@ class Worker:
         with self._blaming_damage(opened):
             with clock.phase("compute"):
                 answer = work.query.answer(opened, context)
-            if work.representation.media_type == JSON:
+            if work.query.representation.media_type == JSON:
                 check_json_size(answer.values, settings.max_json_values, work.query.hint)
             with clock.phase("encode"):
-                encoded = encode(answer, work.representation)
+                parts, headers = encode(answer, work.query.representation)
                 result = write_result(
                     self.config.results,
                     work.result_name,
-                    self._verified_parts(encoded.parts, opened, cancel),
-                    encoded.headers,
+                    self._verified_parts(parts, opened, cancel),
+                    headers,
                     code_version(),
                     is_cheap=clock.seconds["compute"] < SMALL_SECONDS,
                 )
@@ -181,7 +181,7 @@ class Worker:
         with clock.phase("load"):
             opened = self._open(work.query)
         with self._blaming_damage(opened):
-            with clock.phase("compute"), _refusing_overflow(work.dtype):
+            with clock.phase("compute"), _refusing_overflow(work.query.representation.dtype):
                 parts = self._parts_of(work, opened, cancel)
                 rows = parts.compute(
                     work.part,
@@ -216,7 +216,7 @@ class Worker:
             parts = self._parts_of(work, opened, cancel)
             answer = work.query.answer_of_parts(opened, work.reached, cancel)
         with clock.phase("encode"):
-            headers = array_headers(answer, np.dtype(work.dtype), parts.shape)
+            headers = array_headers(answer, np.dtype(work.query.representation.dtype), parts.shape)
             write, check = partial(parts.write, part=part), partial(_stop_if, cancel)
             name = work.result_name
             result = write_result_file(root, name, write, headers, code_version(), check)
@@ -226,9 +226,9 @@ class Worker:
         self, work: ComputePart | JoinParts, opened: OpenMesh, cancel: Callable[[], bool]
     ) -> gc.MatrixParts:
         """Return the parts of a matrix; many of them come one after the other."""
-        made, question = self._matrix, (work.query.written, work.dtype)
+        made, question = self._matrix, (work.query.written, work.query.representation.dtype)
         if made is None or made.opened is not opened or made.question != question:
-            parts = work.query.parts(opened, work.dtype, cancel)
+            parts = work.query.parts(opened, cancel)
             made = self._matrix = _Matrix(opened, question, parts)
         return made.parts
 

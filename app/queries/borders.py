@@ -29,7 +29,6 @@ from app.queries.points import (
     to_sources,
 )
 from app.queries.validation import (
-    MeshSize,
     WrittenPoints,
     check_count,
     check_json_size,
@@ -50,7 +49,7 @@ class BordersQuery(Query[BordersRequest]):
     offers = OFFERS
     hint = "set a larger chord_error, or a max_distance"
 
-    def check_limits(self, size: MeshSize, settings: Settings) -> None:
+    def check_limits(self, settings: Settings) -> None:
         """Refuse too many sources."""
         check_count("sources", point_count(*self.request.sources), settings, "max_sources")
 
@@ -63,17 +62,17 @@ class BordersQuery(Query[BordersRequest]):
         """Yield the sources."""
         return points_in_sources(self.request.sources)
 
-    def rough_seconds(self, size: MeshSize) -> float:
+    def rough_seconds(self) -> float:
         """Return the cost of two sweeps to the limit, and of the lines."""
         request = self.request
-        share = share_reached(size, point_count(*request.sources), request.max_distance)
+        share = share_reached(self.size, point_count(*request.sources), request.max_distance)
         lines = math.sqrt(len(request.sources) - 1)  # as the length of all borders grows
-        crossed = min(1.0, lines * FACES_ON_LEVEL / math.sqrt(size.faces)) * share
-        sweep = sweep_seconds(size.faces, EXACT, share, crossed=crossed)
+        crossed = min(1.0, lines * FACES_ON_LEVEL / math.sqrt(self.size.faces)) * share
+        sweep = sweep_seconds(self.size.faces, EXACT, share, crossed=crossed)
         # The windows over an edge grow with the distance to its source.
-        windows = math.sqrt(share * size.faces / len(request.sources))
+        windows = math.sqrt(share * self.size.faces / len(request.sources))
         each = PER_FACE_DIVIDED + PER_WINDOW_DIVIDED * windows
-        return sweep + each * crossed * size.faces
+        return sweep + each * crossed * self.size.faces
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep, then draw the borders, if they fit into the answer."""

@@ -30,7 +30,7 @@ from app.queries.points import (
     points_in_sources,
     to_sources,
 )
-from app.queries.validation import MeshSize, WrittenPoints, check_count, invalid_fields
+from app.queries.validation import WrittenPoints, check_count, invalid_fields
 from app.queries.views import columns_of, surface_of, table_of_distances
 from app.schemas.requests import DistancesRequest
 from app.settings import Settings
@@ -55,7 +55,7 @@ class DistancesQuery(Query[DistancesRequest]):
         included = list(dict.fromkeys(request.include))
         return with_default_accuracy(request.model_copy(update={"include": included}))
 
-    def check_limits(self, size: MeshSize, settings: Settings) -> None:
+    def check_limits(self, settings: Settings) -> None:
         """Refuse too many sources."""
         check_count("sources", point_count(*self.request.sources), settings, "max_sources")
 
@@ -71,11 +71,11 @@ class DistancesQuery(Query[DistancesRequest]):
         if faults and media_type in (NPY, OCTETS):
             raise problem("invalid_request", f"{media_type} holds one array", errors=tuple(faults))
 
-    def value_count(self, size: MeshSize) -> int:
+    def value_count(self) -> int:
         """Return the number of distances, and of the values that are included with each."""
         columns = 1 + sum(_VALUES_INCLUDED[name] for name in self._included)
         if self.request.targets is None:
-            return columns * size.vertices
+            return columns * self.size.vertices
         return (columns + VALUES_OF_POINT) * len(self.request.targets)
 
     @property
@@ -90,13 +90,13 @@ class DistancesQuery(Query[DistancesRequest]):
             points_in_sources(request.sources), numbered("/targets", request.targets or ())
         )
 
-    def rough_seconds(self, size: MeshSize) -> float:
+    def rough_seconds(self) -> float:
         """Return the cost of a sweep to the limit."""
         request = self.request
         sources = point_count(*request.sources)
-        share = share_reached(size, sources, request.max_distance)
+        share = share_reached(self.size, sources, request.max_distance)
         points = sources + len(request.targets or ())
-        return sweep_seconds(size.faces, request, share) + PER_POINT * points
+        return sweep_seconds(self.size.faces, request, share) + PER_POINT * points
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep once."""

@@ -32,7 +32,6 @@ from app.queries.points import (
     to_sources,
 )
 from app.queries.validation import (
-    MeshSize,
     WrittenPoints,
     check_count,
     check_json_size,
@@ -64,7 +63,7 @@ class IsolinesQuery(Query[IsolinesRequest]):
             raise invalid_fields(["/count"], "does not go with levels")
         return with_default_accuracy(request)
 
-    def check_limits(self, size: MeshSize, settings: Settings) -> None:
+    def check_limits(self, settings: Settings) -> None:
         """Refuse too many sources or levels."""
         check_count("sources", point_count(*self.request.sources), settings, "max_sources")
         check_count("levels", self._level_count, settings, "max_levels")
@@ -78,13 +77,13 @@ class IsolinesQuery(Query[IsolinesRequest]):
         """Yield the sources."""
         return points_in_sources(self.request.sources)
 
-    def rough_seconds(self, size: MeshSize) -> float:
+    def rough_seconds(self) -> float:
         """Return the cost of a sweep to the limit, and of the lines."""
         request = self.request
-        share = share_reached(size, point_count(*request.sources), request.max_distance)
-        crossed = min(1.0, self._level_count * FACES_ON_LEVEL / math.sqrt(size.faces)) * share
-        sweep = sweep_seconds(size.faces, request, share, crossed=crossed)
-        return sweep + PER_FACE_CROSSED * crossed * size.faces
+        share = share_reached(self.size, point_count(*request.sources), request.max_distance)
+        crossed = min(1.0, self._level_count * FACES_ON_LEVEL / math.sqrt(self.size.faces)) * share
+        sweep = sweep_seconds(self.size.faces, request, share, crossed=crossed)
+        return sweep + PER_FACE_CROSSED * crossed * self.size.faces
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep, then draw level by level, as long as the lines fit into the answer."""

@@ -11,7 +11,7 @@ from app.errors import Fault
 from app.queries.base import VALUES_OF_POINT, ExecutionContext, Query
 from app.queries.cost_model import PER_POSITION
 from app.queries.points import SurfacePoints, checkpoint, describe_point
-from app.queries.validation import MeshSize, invalid_points
+from app.queries.validation import invalid_points
 from app.queries.views import table_of_points
 from app.schemas.requests import LocateRequest
 from app.store.meshes import OpenMesh
@@ -25,11 +25,11 @@ class LocateQuery(Query[LocateRequest]):
     offers: Sequence[str] = (JSON, CSV)
     hint = "ask for fewer points at once"
 
-    def value_count(self, size: MeshSize) -> int:
+    def value_count(self) -> int:
         """Return the number of values of all points."""
         return VALUES_OF_POINT * len(self.request.points)
 
-    def rough_seconds(self, size: MeshSize) -> float:
+    def rough_seconds(self) -> float:
         """Return the cost of locating each position."""
         return PER_POSITION * len(self.request.points)
 

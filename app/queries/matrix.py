@@ -4,13 +4,13 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 import geodesic_core as gc
-from app.encoding import CSV, JSON, NPY, NPZ, OCTETS, Answer, Elements, Representation
+from app.encoding import CSV, JSON, NPY, NPZ, OCTETS, Answer, Elements
 from app.errors import over_limit
 from app.queries.accuracy import (
     bound_on,
@@ -20,7 +20,7 @@ from app.queries.accuracy import (
 from app.queries.base import VALUES_OF_POINT, ExecutionContext, Query
 from app.queries.cost_model import PER_POINT, share_reached, sweep_seconds
 from app.queries.points import SurfacePoints, components_of, describe_point, numbered
-from app.queries.validation import MeshSize, WrittenPoints, check_count, invalid_fields
+from app.queries.validation import WrittenPoints, check_count, invalid_fields
 from app.queries.views import table_of_matrix, table_of_sparse
 from app.schemas.requests import Layout, MatrixRequest
 from app.settings import Settings
@@ -73,63 +73,54 @@ class MatrixQuery(Query[MatrixRequest]):
             return "ask for application/x-npz, with `Accept` or with ?format=npz"
         return super().hint
 
-    def check_answer(
-        self,
-        representation: Representation,
-        size: MeshSize,
-        settings: Settings,
-        *,
-        as_job: bool,
-    ) -> None:
+    def check_answer(self, settings: Settings, *, as_job: bool) -> None:
         """Refuse a matrix that is too large for the memory of a worker, or as a job for the store.
 
         The parts and the file are there at the same time.
         """
-        if self.is_in_parts(representation, size, settings, as_job=as_job):
-            needed = self.bytes_in_parts(representation, size)
+        if self.is_in_parts(settings, as_job=as_job):
+            needed = self.bytes_in_parts()
             if needed > settings.results_bytes:
                 what, limit = "bytes of the matrix and its parts", settings.results_bytes
                 raise over_limit("limit_exceeded", what, needed, limit, "results_bytes")
         else:
-            self._check_in_memory(size, settings)
-        super().check_answer(representation, size, settings, as_job=as_job)
+            self._check_in_memory(settings)
+        super().check_answer(settings, as_job=as_job)
 
-    def is_in_parts(
-        self, representation: Representation, size: MeshSize, settings: Settings, *, as_job: bool
-    ) -> bool:
+    def is_in_parts(self, settings: Settings, *, as_job: bool) -> bool:
         """Tell whether the answer is computed in parts, since it may be too large for memory."""
-        if not as_job or representation.media_type != _IN_PARTS.get(self.request.layout):
+        if not as_job or self.representation.media_type != _IN_PARTS.get(self.request.layout):
             return False
-        sources, targets = self._count(size)
+        sources, targets = self._count()
         return sources > settings.max_sources or sources * targets > settings.max_matrix_cells
 
-    def areas_of_parts(self, size: MeshSize) -> list[int]:
+    def areas_of_parts(self) -> list[int]:
         """Return the number of distances in each part."""
-        sources, targets = self._count(size)
+        sources, targets = self._count()
         return gc.MatrixParts.areas(
             sources,
             None if self._is_symmetric else targets,
-            size.faces,
+            self.size.faces,
             self.request.max_distance,
         )
 
-    def bytes_in_parts(self, representation: Representation, size: MeshSize) -> int:
+    def bytes_in_parts(self) -> int:
         """Return the size of the parts and of the file that they become.
 
         Of a sparse matrix these are only the ends of rows: `bytes_of_part` tells the rest.
         """
         if self.request.layout == "sparse":
-            return _INDEX_BYTES * self._count(size)[0]
-        cells = sum(self.areas_of_parts(size)) + math.prod(self._count(size))
-        return cells * np.dtype(representation.dtype).itemsize
+            return _INDEX_BYTES * self._count()[0]
+        cells = sum(self.areas_of_parts()) + math.prod(self._count())
+        return cells * np.dtype(self.representation.dtype).itemsize
 
-    def bytes_of_part(self, representation: Representation, nbytes: int, reached: int) -> int:
+    def bytes_of_part(self, nbytes: int, reached: int) -> int:
         """Return what a part of ``nbytes`` adds to `bytes_in_parts`, once it is computed."""
         if self.request.layout == "dense":
             return 0
-        return nbytes + reached * (_INDEX_BYTES + np.dtype(representation.dtype).itemsize)
+        return nbytes + reached * (_INDEX_BYTES + np.dtype(self.representation.dtype).itemsize)
 
-    def parts(self, opened: OpenMesh, dtype: Any, cancel: Callable[[], bool]) -> gc.MatrixParts:
+    def parts(self, opened: OpenMesh, cancel: Callable[[], bool]) -> gc.MatrixParts:
         """Return the parts of the matrix, which are still to be computed."""
         mesh, request = opened.mesh, self.request
         sources, targets = self._sides(mesh, self.resolved(mesh, cancel))
@@ -141,7 +132,7 @@ class MatrixQuery(Query[MatrixRequest]):
             layout=request.layout,
             **options_of(request),
             max_distance=request.max_distance,
-            dtype=dtype,
+            dtype=cast(Any, self.representation.dtype),
             cancel=cancel,
         )
 
@@ -156,10 +147,10 @@ class MatrixQuery(Query[MatrixRequest]):
         warnings = self.noted(opened, points).warnings
         return Answer(self._about(mesh) | {"unreachable": unreachable, "warnings": warnings})
 
-    def value_count(self, size: MeshSize) -> int:
+    def value_count(self) -> int:
         """Return the number of cells, and of the values of each point."""
-        points = VALUES_OF_POINT * sum(self._count(size))
-        return points if self.request.layout == "sparse" else points + self._cells(size)
+        points = VALUES_OF_POINT * sum(self._count())
+        return points if self.request.layout == "sparse" else points + self._cells()
 
     def written_points(self) -> WrittenPoints:
         """Yield the sources, then other targets, where they are written one by one."""
@@ -168,11 +159,11 @@ class MatrixQuery(Query[MatrixRequest]):
             if points != "all":
                 yield from numbered(f"/{name}", points)
 
-    def rough_seconds(self, size: MeshSize) -> float:
+    def rough_seconds(self) -> float:
         """Return the cost of a sweep to the limit from each point of the smaller side."""
-        count = self._count(size)
-        share = share_reached(size, 1, self.request.max_distance)
-        one = sweep_seconds(size.faces, self.request, share)
+        count = self._count()
+        share = share_reached(self.size, 1, self.request.max_distance)
+        one = sweep_seconds(self.size.faces, self.request, share)
         return min(count) * one + PER_POINT * sum(count)
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
@@ -208,23 +199,23 @@ class MatrixQuery(Query[MatrixRequest]):
             f"ask for {media_type} with `Prefer: respond-async`: such a job may have more cells"
         )
 
-    def _check_in_memory(self, size: MeshSize, settings: Settings) -> None:
+    def _check_in_memory(self, settings: Settings) -> None:
         """Refuse too many sources, or cells where their number is known before solving."""
         hint = self._as_job
-        check_count("sources", self._count(size)[0], settings, "max_sources", hint=hint)
+        check_count("sources", self._count()[0], settings, "max_sources", hint=hint)
         if self.request.layout != "sparse" or self.request.max_distance is None:
-            check_count(_CELLS, self._cells(size), settings, "max_matrix_cells", hint=hint)
+            check_count(_CELLS, self._cells(), settings, "max_matrix_cells", hint=hint)
 
-    def _count(self, size: MeshSize) -> tuple[int, int]:
+    def _count(self) -> tuple[int, int]:
         """Return the numbers of sources and of targets."""
         sources, targets = (
-            size.vertices if points == "all" else len(points)
+            self.size.vertices if points == "all" else len(points)
             for points in (self.request.sources, self.request.targets)
         )
         return sources, targets
 
-    def _cells(self, size: MeshSize) -> int:
-        sources, targets = self._count(size)
+    def _cells(self) -> int:
+        sources, targets = self._count()
         return sources if self.request.layout == "pairs" else sources * targets
 
     def _sides(self, mesh: gc.TriangleMesh, written: SurfacePoints) -> "tuple[_Side, _Side]":

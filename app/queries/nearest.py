@@ -18,7 +18,7 @@ from app.queries.points import (
     describe_point,
     numbered,
 )
-from app.queries.validation import MeshSize, WrittenPoints, invalid_fields
+from app.queries.validation import WrittenPoints, invalid_fields
 from app.queries.views import table_of_points
 from app.schemas.requests import Accuracy, NearestRequest
 from app.store.meshes import OpenMesh
@@ -41,7 +41,7 @@ class NearestQuery(Query[NearestRequest]):
             raise invalid_fields(["/k"], message)
         return request
 
-    def value_count(self, size: MeshSize) -> int:
+    def value_count(self) -> int:
         """Return the number of values of ``k`` candidates."""
         return (VALUES_OF_POINT + 1) * self.request.k
 
@@ -50,10 +50,10 @@ class NearestQuery(Query[NearestRequest]):
         request = self.request
         return chain([("/source", request.source)], numbered("/candidates", request.candidates))
 
-    def rough_seconds(self, size: MeshSize) -> float:
+    def rough_seconds(self) -> float:
         """Return the cost of a sweep to the limit."""
-        share = share_reached(size, 1, self.request.max_distance)
-        sweep = sweep_seconds(size.faces, Accuracy(), share)
+        share = share_reached(self.size, 1, self.request.max_distance)
+        sweep = sweep_seconds(self.size.faces, Accuracy(), share)
         return sweep + PER_POINT * len(self.request.candidates)
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:

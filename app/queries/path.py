@@ -16,7 +16,6 @@ from app.queries.cost_model import search_seconds, share_reached, sweep_seconds
 from app.queries.outline import SHOWN, no_outline, outline_of
 from app.queries.points import SurfacePoints, describe_point, numbered
 from app.queries.validation import (
-    MeshSize,
     WrittenPoints,
     check_count,
     detail_of,
@@ -44,7 +43,7 @@ class PathQuery(Query[PathRequest]):
             raise invalid_fields(["/waypoints"], "goes with method 'exact' only")
         return with_default_accuracy(request)
 
-    def check_limits(self, size: MeshSize, settings: Settings) -> None:
+    def check_limits(self, settings: Settings) -> None:
         """Refuse too many waypoints."""
         check_count("waypoints", len(self.request.waypoints), settings, "max_waypoints")
 
@@ -53,13 +52,13 @@ class PathQuery(Query[PathRequest]):
         ends = ("/source", self.request.source), ("/target", self.request.target)
         return chain(ends, numbered("/waypoints", self.request.waypoints))
 
-    def rough_seconds(self, size: MeshSize) -> float:
+    def rough_seconds(self) -> float:
         """Return the cost of a search for each leg, or of a sweep."""
         request = self.request
         if request.method != "exact":
-            share = share_reached(size, 1, request.max_distance)
-            return sweep_seconds(size.faces, request, share)
-        return search_seconds(size.faces, 1 + len(request.waypoints))
+            share = share_reached(self.size, 1, request.max_distance)
+            return sweep_seconds(self.size.faces, request, share)
+        return search_seconds(self.size.faces, 1 + len(request.waypoints))
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Search for an exact path, or sweep for another one."""

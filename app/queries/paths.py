@@ -26,7 +26,7 @@ from app.queries.points import (
     points_in,
     to_point_or_curve,
 )
-from app.queries.validation import MeshSize, WrittenPoints, check_count, check_json_size
+from app.queries.validation import WrittenPoints, check_count, check_json_size
 from app.queries.views import line_of
 from app.schemas.requests import PathsRequest
 from app.settings import Settings
@@ -46,7 +46,7 @@ class PathsQuery(Query[PathsRequest]):
         """Name error or effort."""
         return with_default_accuracy(request)
 
-    def value_count(self, size: MeshSize) -> int:
+    def value_count(self) -> int:
         """Return the least number of values: those of the ends of the paths."""
         return VALUES_OF_POINT * len(self.request.targets)
 
@@ -60,15 +60,15 @@ class PathsQuery(Query[PathsRequest]):
         request = self.request
         return chain(points_in("/source", request.source), numbered("/targets", request.targets))
 
-    def check_limits(self, size: MeshSize, settings: Settings) -> None:
+    def check_limits(self, settings: Settings) -> None:
         """Refuse too many points of a curve."""
         check_count("sources", point_count(self.request.source), settings, "max_sources")
 
-    def rough_seconds(self, size: MeshSize) -> float:
+    def rough_seconds(self) -> float:
         """Return the cost of a sweep to the limit, and of the paths."""
         request = self.request
-        share = share_reached(size, point_count(request.source), request.max_distance)
-        sweep = sweep_seconds(size.faces, request, share)
+        share = share_reached(self.size, point_count(request.source), request.max_distance)
+        sweep = sweep_seconds(self.size.faces, request, share)
         return sweep + (PER_PATH + PER_POINT) * len(request.targets)
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:

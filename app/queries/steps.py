@@ -7,7 +7,7 @@ from app.encoding import JSON, Answer
 from app.queries.base import ExecutionContext, Query
 from app.queries.cost_model import search_seconds
 from app.queries.points import SurfacePoints, numbered
-from app.queries.validation import MeshSize, WrittenPoints, check_count
+from app.queries.validation import WrittenPoints, check_count
 from app.schemas.requests import StepsRequest
 from app.settings import Settings
 from app.store.meshes import OpenMesh
@@ -21,7 +21,7 @@ class StepsQuery(Query[StepsRequest]):
     offers = (JSON,)
     hint = "ask with fewer waypoints at once"
 
-    def check_limits(self, size: MeshSize, settings: Settings) -> None:
+    def check_limits(self, settings: Settings) -> None:
         """Refuse too many waypoints."""
         check_count("waypoints", len(self.request.waypoints), settings, "max_waypoints")
 
@@ -30,9 +30,9 @@ class StepsQuery(Query[StepsRequest]):
         ends = ("/source", self.request.source), ("/target", self.request.target)
         return chain(ends, numbered("/waypoints", self.request.waypoints))
 
-    def rough_seconds(self, size: MeshSize) -> float:
+    def rough_seconds(self) -> float:
         """Return the cost of a search for each leg."""
-        return search_seconds(size.faces, 1 + len(self.request.waypoints))
+        return search_seconds(self.size.faces, 1 + len(self.request.waypoints))
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Search anew: what a solver has learnt from other paths would change the steps."""

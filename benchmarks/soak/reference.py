@@ -205,9 +205,8 @@ def _answer(
     if len(query.barriers):
         opened = query.with_barriers(opened)
     context = ExecutionContext(lambda: False, lambda _: None)
-    encoded = encode(query.answer(opened, context), representation)
-    digest = digest_of(b"".join(encoded.parts))
-    return Expected(digest=digest, headers=encoded.headers)
+    parts, headers = encode(query.answer(opened, context), representation)
+    return Expected(digest=digest_of(b"".join(parts)), headers=headers)
 
 
 # Requests that need no worker

@@ -163,7 +163,7 @@ def test_keys_tell_methods_and_errors_apart() -> None:
     ]
 
     ends = {"source": VertexPoint(vertex=0), "target": VertexPoint(vertex=1)}
-    keys = {result_key(PathQuery("m", PathRequest(**ends, **errors)), "a/b") for errors in bounds}
+    keys = {result_key(PathQuery("m", PathRequest(**ends, **errors))) for errors in bounds}
 
     assert len(keys) == len(bounds)
 

@@ -89,7 +89,7 @@ def test_spellings_of_barriers_are_one_query(
         )
         for barriers in ([3, 1], [1, 3, 3], [1])
     ]
-    keys = [result_key(query, "a/b") for query in queries]
+    keys = [result_key(query) for query in queries]
     assert keys[0] == keys[1] != keys[2]
     assert queries[0].barriers.tolist() == [1, 3]
 

@@ -171,7 +171,7 @@ def test_each_route_has_a_result_of_its_own() -> None:
         for route in routes
     ]
 
-    assert len({result_key(query, "application/json") for query in queries}) == len(routes)
+    assert len({result_key(query) for query in queries}) == len(routes)
 
 
 def test_waypoints_are_limited(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Response
 from app.encoding import CSV, JSON, NPY, NPZ, OBJ, OCTETS, PLY
 from app.encoding.representation import ARRAYS, TEXTS
 from app.http.responses import FILE_HEADERS, QUERY_PROBLEMS, documented, problems
-from app.http.routes.query_request import QueryRequestDep
+from app.http.routes.query_request import AnswerDep
 from app.http.routes.query_route import QueryRoute
 from app.queries import (
     BordersQuery,
@@ -128,10 +128,10 @@ Parameters = Annotated[AnswerParameters, Query()]
     ),
 )
 async def compute_distances(
-    body: DistancesRequest, parameters: Parameters, query_request: QueryRequestDep
+    body: DistancesRequest, parameters: Parameters, answer: AnswerDep
 ) -> Response:
     """Return the distance along the surface from the nearest source to each vertex."""
-    return await query_request.answer(DistancesQuery, body, parameters)
+    return await answer(DistancesQuery, body, parameters)
 
 
 @router.post(
@@ -142,11 +142,9 @@ async def compute_distances(
         _answers(PathAnswer, _PATH, NPY, OCTETS, *_LINES),
     ),
 )
-async def compute_path(
-    body: PathRequest, parameters: Parameters, query_request: QueryRequestDep
-) -> Response:
+async def compute_path(body: PathRequest, parameters: Parameters, answer: AnswerDep) -> Response:
     """Return the points of the path, from source to target, and the faces it crosses."""
-    return await query_request.answer(PathQuery, body, parameters)
+    return await answer(PathQuery, body, parameters)
 
 
 @router.get(
@@ -163,15 +161,11 @@ async def compute_path(
         **problems(*_CODES, quota_exceeded=507),
     },
 )
-async def get_path(
-    parameters: Annotated[PathParameters, Query()], query_request: QueryRequestDep
-) -> Response:
+async def get_path(parameters: Annotated[PathParameters, Query()], answer: AnswerDep) -> Response:
     """Return the same as `POST`, for points written as `12`, `v12` or `f7:0.2,0.3,0.5`."""
     with naming_parameters():
         body = written_request(parameters)
-        return await query_request.answer(
-            PathQuery, body, AnswerParameters(format=parameters.format)
-        )
+        return await answer(PathQuery, body, AnswerParameters(format=parameters.format))
 
 
 @router.post(
@@ -183,10 +177,10 @@ async def get_path(
     ),
 )
 async def compute_path_steps(
-    body: StepsRequest, parameters: Parameters, query_request: QueryRequestDep
+    body: StepsRequest, parameters: Parameters, answer: AnswerDep
 ) -> Response:
     """Return what the search does to find the exact path: the faces that each step visits."""
-    return await query_request.answer(StepsQuery, body, parameters)
+    return await answer(StepsQuery, body, parameters)
 
 
 @router.post(
@@ -197,11 +191,9 @@ async def compute_path_steps(
         _answers(PathsAnswer, "The paths, in the order of the targets", *_LINES),
     ),
 )
-async def compute_paths(
-    body: PathsRequest, parameters: Parameters, query_request: QueryRequestDep
-) -> Response:
+async def compute_paths(body: PathsRequest, parameters: Parameters, answer: AnswerDep) -> Response:
     """Return a path to each target, or the reason why there is none."""
-    return await query_request.answer(PathsQuery, body, parameters)
+    return await answer(PathsQuery, body, parameters)
 
 
 @router.post(
@@ -213,10 +205,10 @@ async def compute_paths(
     ),
 )
 async def compute_isolines(
-    body: IsolinesRequest, parameters: Parameters, query_request: QueryRequestDep
+    body: IsolinesRequest, parameters: Parameters, answer: AnswerDep
 ) -> Response:
     """Return the polylines of points at each level, exact where they cross edges."""
-    return await query_request.answer(IsolinesQuery, body, parameters)
+    return await answer(IsolinesQuery, body, parameters)
 
 
 @router.post(
@@ -228,13 +220,13 @@ async def compute_isolines(
     ),
 )
 async def compute_borders(
-    body: BordersRequest, parameters: Parameters, query_request: QueryRequestDep
+    body: BordersRequest, parameters: Parameters, answer: AnswerDep
 ) -> Response:
     """Return polylines of points that are equally near to two sources, and no nearer to a third.
 
     They are exact where they cross edges and where they meet.
     """
-    return await query_request.answer(BordersQuery, body, parameters)
+    return await answer(BordersQuery, body, parameters)
 
 
 @router.post(
@@ -254,14 +246,14 @@ async def compute_borders(
     ),
 )
 async def compute_matrix(
-    body: MatrixRequest, parameters: Parameters, query_request: QueryRequestDep
+    body: MatrixRequest, parameters: Parameters, answer: AnswerDep
 ) -> Response:
     """Return a distance for each source and target, or for each pair.
 
     In binary, a dense matrix and pairs come as npy and octets, a sparse matrix as npz. As a job, a
     dense matrix in npy may be as large as the store has room for; its rows are read in ranges.
     """
-    return await query_request.answer(MatrixQuery, body, parameters)
+    return await answer(MatrixQuery, body, parameters)
 
 
 @router.post(
@@ -272,11 +264,9 @@ async def compute_matrix(
         _answers(NearestAnswer, "The candidates, nearest first", CSV),
     ),
 )
-async def find_nearest(
-    body: NearestRequest, parameters: Parameters, query_request: QueryRequestDep
-) -> Response:
+async def find_nearest(body: NearestRequest, parameters: Parameters, answer: AnswerDep) -> Response:
     """Return the `k` nearest candidates, or fewer if fewer can be reached."""
-    return await query_request.answer(NearestQuery, body, parameters)
+    return await answer(NearestQuery, body, parameters)
 
 
 @router.post(
@@ -287,11 +277,9 @@ async def find_nearest(
         _answers(LocateAnswer, "The points, in the order of the positions", CSV),
     ),
 )
-async def locate_points(
-    body: LocateRequest, parameters: Parameters, query_request: QueryRequestDep
-) -> Response:
+async def locate_points(body: LocateRequest, parameters: Parameters, answer: AnswerDep) -> Response:
     """Return the nearest point for each position, `null` where it is farther than `max_distance`.
 
     A point counts as on a vertex or an edge if it is within 1e-12 of the bounding box from it.
     """
-    return await query_request.answer(LocateQuery, body, parameters)
+    return await answer(LocateQuery, body, parameters)

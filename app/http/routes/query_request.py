@@ -1,7 +1,7 @@
-"""Query requests: the body and what comes with it, read from HTTP, and the way to a response."""
+"""Requests for queries: the body and what comes with it, read from HTTP, and the response."""
 
-from collections.abc import Coroutine
-from dataclasses import dataclass
+from collections.abc import Awaitable, Callable, Coroutine
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import Depends, Header, Request, Response
@@ -34,8 +34,6 @@ from app.jobs import Job
 from app.queries import Query, result_key
 from app.schemas.requests import AnswerParameters
 from app.service.answering import Answered
-from app.service.question import Question
-from app.service.request_context import RequestContext
 from app.settings import Settings
 
 _LEAST_BYTES_OF_VALUE = 7
@@ -58,61 +56,6 @@ def parse_json(body: bytes, settings: Settings) -> Any:
         raise problem(code, f"the body cannot be read as JSON: {error}") from None
 
 
-@dataclass(frozen=True)
-class QueryRequest:
-    """A request for a query: the mesh, the caller and the preferences, all but the query itself."""
-
-    mesh_id: str
-    request: Request
-    context: RequestContext
-    job_after_s: int | None
-    """Seconds of waiting from which the client prefers a job; None: never"""
-    idempotency_key: str | None
-
-    async def answer(
-        self, kind: type[Query[Any]], body: Any, parameters: AnswerParameters
-    ) -> Response:
-        """Validate the query in ``body``, and respond with its answer or a job."""
-        request, context = self.request, self.context
-        service = service_of(request)
-        size = await service.size(self.mesh_id)
-
-        def make_query() -> Query[Any]:
-            query = kind.ask(self.mesh_id, size, body, service.settings)
-            query.written  # noqa: B018 - computes and caches it
-            return query
-
-        query = await large_bodies_of(request).check(request, context.deadline_s, make_query)
-        representation = negotiated(request, parameters, query.offers)
-        media_type = representation.media_type
-        question = Question(query, size, representation, context.caller.name)
-        wait_s, key = self.job_after_s, self.idempotency_key
-        if wait_s == 0:
-            job = await service.query_jobs.submit(question, context, key)
-            return accepted_response(job, prefix_of(request.scope))
-        is_cacheable = request.method == "GET"
-        headers = {**NEGOTIATED, **(CACHED if is_cacheable else UNSTORED)}
-        if is_cacheable:
-            etag = etag_of(result_key(query, representation))
-            unchanged = not_modified(request, etag, headers)
-            if unchanged is not None:
-                return unchanged
-        as_file = "range" in request.headers
-        answering: Coroutine[Any, Any, Answered | Job]
-        if wait_s is None:
-            answering = service.answering.answer(question, context.deadline_s, as_file=as_file)
-        else:
-            answering = service.query_jobs.answer_or_submit(
-                question, context, wait_s, key, as_file=as_file
-            )
-        answer = await while_connected(request, answering)
-        if isinstance(answer, Job):
-            return accepted_response(answer, prefix_of(request.scope))
-        result, seconds = answer
-        note_work(request, self.mesh_id, seconds)
-        return result_response(request, result, seconds, media_type, service.results, headers)
-
-
 class QueryHeaders(TimeoutHeader):
     """The headers of a request for a query."""
 
@@ -133,14 +76,63 @@ class QueryHeaders(TimeoutHeader):
     )
 
 
-async def get_query_request(
+AnswerQuery = Callable[[type[Query[Any]], Any, AnswerParameters], Awaitable[Response]]
+"""Answers the query of a kind in a body, with these parameters"""
+
+
+async def get_answer(
     mesh_id: str, request: Request, headers: Annotated[QueryHeaders, Header()]
-) -> QueryRequest:
-    """Return the request for a query, as a dependency."""
-    context, job_after_s = context_of(request, headers), job_after(headers.prefer)
-    if job_after_s is None:
+) -> AnswerQuery:
+    """Return what answers the query of a request, as a dependency."""
+    return partial(_answer, mesh_id, request, headers)
+
+
+AnswerDep = Annotated[AnswerQuery, Depends(get_answer)]
+
+
+async def _answer(
+    mesh_id: str,
+    request: Request,
+    preferences: QueryHeaders,
+    kind: type[Query[Any]],
+    body: Any,
+    parameters: AnswerParameters,
+) -> Response:
+    """Validate the query in ``body``, and respond with its answer or a job."""
+    service, context = service_of(request), context_of(request, preferences)
+    wait_s, key = job_after(preferences.prefer), preferences.idempotency_key
+    if wait_s is None:
         refuse_idempotency_key(request)
-    return QueryRequest(mesh_id, request, context, job_after_s, headers.idempotency_key)
+    size = await service.size(mesh_id)
 
+    def make_query() -> Query[Any]:
+        query = kind.ask(mesh_id, size, body, service.settings)
+        query = query.answered_as(negotiated(request, parameters, query.offers))
+        query.written  # noqa: B018 - computes and caches it
+        return query
 
-QueryRequestDep = Annotated[QueryRequest, Depends(get_query_request)]
+    query = await large_bodies_of(request).check(request, context.deadline_s, make_query)
+    if wait_s == 0:
+        job = await service.query_jobs.submit(query, context, key)
+        return accepted_response(job, prefix_of(request.scope))
+    is_cacheable = request.method == "GET"
+    headers = {**NEGOTIATED, **(CACHED if is_cacheable else UNSTORED)}
+    if is_cacheable:
+        unchanged = not_modified(request, etag_of(result_key(query)), headers)
+        if unchanged is not None:
+            return unchanged
+    as_file = "range" in request.headers
+    answering: Coroutine[Any, Any, Answered | Job]
+    if wait_s is None:
+        answering = service.answering.answer(query, context, as_file=as_file)
+    else:
+        answering = service.query_jobs.answer_or_submit(
+            query, context, wait_s, key, as_file=as_file
+        )
+    answer = await while_connected(request, answering)
+    if isinstance(answer, Job):
+        return accepted_response(answer, prefix_of(request.scope))
+    result, seconds = answer
+    note_work(request, mesh_id, seconds)
+    media_type = query.representation.media_type
+    return result_response(request, result, seconds, media_type, service.results, headers)

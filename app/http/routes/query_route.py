@@ -17,7 +17,7 @@ from app.http.dependencies import require_json, service_of
 from app.http.large_bodies import large_bodies_of
 from app.http.routes.query_request import (
     QueryHeaders,
-    get_query_request,
+    get_answer,
     parse_json,
 )
 from app.queries import check_lengths
@@ -25,7 +25,7 @@ from app.settings import Settings
 
 
 class QueryRoute(APIRoute):
-    """A route whose handler takes ``query_request``, ``parameters`` and, unless ``GET``, ``body``.
+    """A route whose handler takes ``answer``, ``parameters`` and, unless ``GET``, ``body``.
 
     The latter two are models.
     """
@@ -54,7 +54,7 @@ class QueryRoute(APIRoute):
                 whole = read(model, head, b"", settings)
             mesh_id = request.path_params["mesh_id"]
             response: Response = await self.endpoint(
-                query_request=await get_query_request(mesh_id, request, whole.header),
+                answer=await get_answer(mesh_id, request, whole.header),
                 parameters=whole.query,
                 **({"body": whole.body} if takes_body else {}),
             )

@@ -1,7 +1,6 @@
 """A worker, in this process: what it keeps open, and work that fails or is stopped."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -11,7 +10,7 @@ import numpy as np
 import orjson
 import pytest
 
-from app.encoding import CSV, NPY, Encoded, encode
+from app.encoding import CSV, NPY, encode
 from app.engine.signals import Signals
 from app.engine.work import (
     ComputePart,
@@ -329,15 +328,15 @@ def test_an_answer_that_is_stopped_while_it_is_written_leaves_no_file(
     mesh_id = store_mesh(tmp_path, samples.sphere(20_000))
     work = run_query(distances_query(mesh_id), CSV)
 
-    def encode_and_stop(*arguments: Any) -> Encoded:
+    def encode_and_stop(*arguments: Any) -> Any:
         def parts() -> Iterator[Any]:
-            first, second, *others = encoded.parts
+            first, second, *others = body
             yield from (first, second)
             signals.stop_number = 1
             yield from others
 
-        encoded = encode(*arguments)
-        return replace(encoded, parts=parts())
+        body, headers = encode(*arguments)
+        return parts(), headers
 
     monkeypatch.setattr("app.engine.worker.encode", encode_and_stop)
 
@@ -356,7 +355,7 @@ def test_a_large_matrix_that_is_stopped_while_its_file_is_read_leaves_no_file(
     mesh_id = store_mesh(tmp_path, samples.sphere(100))
     query = MatrixQuery(mesh_id, MatrixRequest(sources="all", targets="all"))
     write = MatrixParts.write
-    part = worker.do(1, ComputePart(query, "float64", 0, f"{mesh_id}/part"))
+    part = worker.do(1, ComputePart(query, 0, f"{mesh_id}/part"))
     assert isinstance(part, TaskResult)
     before = set(tmp_path.glob("results/*/*"))
 
@@ -366,6 +365,6 @@ def test_a_large_matrix_that_is_stopped_while_its_file_is_read_leaves_no_file(
 
     monkeypatch.setattr(MatrixParts, "write", write_and_stop)
 
-    work = JoinParts(query, "float64", [f"{mesh_id}/part"], 1, f"{mesh_id}/whole")
+    work = JoinParts(query, [f"{mesh_id}/part"], 1, f"{mesh_id}/whole")
     assert worker.do(2, work) is None
     assert set(tmp_path.glob("results/*/*")) == before

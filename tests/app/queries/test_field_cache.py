@@ -24,7 +24,7 @@ def opened() -> OpenMesh:
 def ask(opened: OpenMesh, fields: FieldCache, kind: Any, **body: Any) -> bytes:
     query = kind("id", kind.normalized(kind.model(**body)))
     answer = query.answer(opened, context(fields=fields))
-    return b"".join(encode(answer, Representation("application/json")).parts)
+    return b"".join(encode(answer, Representation("application/json"))[0])
 
 
 SOURCES = [{"vertex": 3}, {"face": 70, "barycentric": [0.2, 0.3, 0.5], "start_distance": 0.1}]
