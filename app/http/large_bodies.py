@@ -5,12 +5,11 @@ done in a thread, and a caller has one at a time. A few bodies of a caller are i
 wait unread, and their clients with them.
 """
 
-from asyncio import Lock, Semaphore
+from asyncio import Lock, Semaphore, get_running_loop
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
-from functools import partial
-from time import sleep, thread_time
+from time import thread_time
 from typing import TypeVar
 from weakref import WeakValueDictionary
 
@@ -79,8 +78,25 @@ class LargeBodies:
             return await while_connected(request, working)
 
     async def _in_thread(self, line: _Line, do: Callable[[], T]) -> T:
-        async with line.turn:
-            return await to_thread.run_sync(partial(at_half_pace, do), limiter=self.checking)
+        """Do work in the turn of a caller, which then rests as long as the work took.
+
+        The work holds the interpreter, of which others get at least half in this way.
+        """
+        spent = 0.0
+
+        def measured() -> T:
+            nonlocal spent
+            began = thread_time()
+            try:
+                return do()
+            finally:
+                spent = thread_time() - began
+
+        await line.turn.acquire()
+        try:
+            return await to_thread.run_sync(measured, limiter=self.checking)
+        finally:
+            get_running_loop().call_later(spent, _end_turn, line)
 
     def _line(self, request: Request) -> _Line:
         return self._lines.setdefault(caller_of(request).name, _Line())
@@ -92,10 +108,5 @@ def large_bodies_of(request: Request) -> LargeBodies:
     return bodies
 
 
-def at_half_pace(do: Callable[[], T]) -> T:
-    """Do what holds the interpreter, and rest as long, so that others get at least half of it."""
-    began = thread_time()
-    try:
-        return do()
-    finally:
-        sleep(thread_time() - began)
+def _end_turn(line: _Line) -> None:
+    line.turn.release()  # the line lives as long as its turn

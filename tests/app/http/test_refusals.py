@@ -1,8 +1,10 @@
 """Refused bodies: however many elements are faulty, few are looked at."""
 
 from contextlib import nullcontext
+from types import SimpleNamespace
 from typing import Any
 
+import anyio
 import pytest
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, TypeAdapter, ValidationError, create_model
@@ -132,9 +134,19 @@ def test_a_body_of_64_kib_may_hold_any_number_of_values(most_bytes: int) -> None
 def test_reading_a_large_body_rests_as_long_as_it_held_the_interpreter(
     monkeypatch: pytest.MonkeyPatch, fails: bool
 ) -> None:
+    """So its caller's next one waits, and others get half of the interpreter."""
     clock, rests = iter([1.0, 3.5]), []
+    loop = SimpleNamespace(call_later=lambda seconds, end, line: rests.append((seconds, end, line)))
     monkeypatch.setattr(large_bodies, "thread_time", lambda: next(clock))
-    monkeypatch.setattr(large_bodies, "sleep", rests.append)
+    monkeypatch.setattr(large_bodies, "get_running_loop", lambda: loop)
+    line = large_bodies._Line()
+
+    async def check() -> int:
+        return await large_bodies.LargeBodies()._in_thread(line, lambda: 1 // (not fails))
+
     with pytest.raises(ZeroDivisionError) if fails else nullcontext():
-        assert large_bodies.at_half_pace(lambda: 1 // (not fails)) == 1
-    assert rests == [2.5]
+        assert anyio.run(check) == 1
+    ((seconds, end, resting),) = rests
+    assert (seconds, resting, line.turn.locked()) == (2.5, line, True)
+    end(resting)
+    assert not line.turn.locked()
