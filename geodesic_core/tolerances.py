@@ -1,6 +1,6 @@
 """Every numeric bound of the library: its name, its unit and its reason.
 
-Each is tested as a bound in ``tests/core/test_tolerances.py``.
+Each is tested as a bound beside what it bounds; ``tests/core/test_tolerances.py`` finds the tests.
 """
 
 SADDLE_EXCESS = 1e-11
