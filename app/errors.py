@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from app.settings import variable_of
 from geodesic_core import errors as core
 
 PROBLEM_JSON = "application/problem+json"
@@ -30,6 +29,12 @@ class Code:
 CODES: Mapping[str, Code] = {
     "malformed_body": Code(
         400, "Malformed body", "The body is not valid for its media type, for example broken JSON."
+    ),
+    "idempotency_key_unused": Code(
+        400,
+        "Idempotency key unused",
+        "`Idempotency-Key` names a job, and this request makes none; send it together with "
+        "`Prefer: respond-async`, or leave it out.",
     ),
     "malformed_request": Code(
         400, "Malformed request", "The bytes received are not a valid HTTP request."
@@ -87,7 +92,8 @@ CODES: Mapping[str, Code] = {
         429,
         "Quota exceeded",
         "The caller has reached the quota that `setting` names. The status is 429 for jobs and for "
-        "uploads under way (see `Retry-After`), and 507 for stored meshes (see `hint`).",
+        "uploads under way (see `Retry-After`), and 507 for stored meshes and for answers to jobs "
+        "(see `hint`).",
         other_statuses=(507,),
     ),
     "header_too_large": Code(
@@ -105,7 +111,10 @@ CODES: Mapping[str, Code] = {
         "The stored files of this mesh are damaged; upload the mesh again.",
     ),
     "queue_full": Code(
-        503, "Queue full", "Too many requests wait for a worker; see `Retry-After`."
+        503,
+        "Queue full",
+        "Too many requests wait for a worker, or too many uploads are under way; see "
+        "`Retry-After`.",
     ),
     "too_many_connections": Code(
         503, "Too many connections", "The service has too many open connections; try again."
@@ -163,10 +172,13 @@ class Problem:
         """The HTTP status."""
         return self.other_status or CODES[self.code].status
 
-    def document(self, instance: str, request_id: str) -> dict[str, Any]:
-        """Return the body of the response (RFC 9457), without members that have no value."""
+    def document(self, instance: str, request_id: str, prefix: str) -> dict[str, Any]:
+        """Return the body of the response (RFC 9457), without members that have no value.
+
+        ``prefix`` is that of the addresses of the service.
+        """
         members = {
-            "type": f"/problems/{self.code}",
+            "type": f"{prefix}/problems/{self.code}",
             "title": CODES[self.code].title,
             "status": self.status,
             "detail": self.detail,
@@ -227,8 +239,19 @@ def over_limit(
         Further members of the problem.
     """
     detail = f"{actual} {what}; at most {limit} are allowed"
-    variable = variable_of(setting)
-    return problem(code, detail, limit=limit, actual=actual, setting=variable, **members)
+    return problem(code, detail, limit=limit, actual=actual, setting=setting, **members)
+
+
+def too_large_unpacked(limit: int, max_bytes: int) -> ProblemError:
+    """Return the exception for a packed file that has more than ``limit`` bytes when unpacked.
+
+    Where that is less than ``max_bytes``, the file grows more than a mesh does.
+    """
+    if limit == max_bytes:
+        detail = f"the file is larger than {limit} bytes when unpacked"
+        return problem("upload_too_large", detail, limit=limit, setting="max_upload_bytes")
+    detail = f"the file is packed too tightly: it is larger than {limit} bytes when unpacked"
+    return problem("upload_too_large", detail, limit=limit, hint="send it without compression")
 
 
 def pointer(*parts: str | int) -> str:
@@ -258,13 +281,9 @@ def _too_many_faces(error: core.TooManyFaces) -> Problem:
     return over_limit("limit_exceeded", "faces", error.faces, error.max_faces, "max_faces").problem
 
 
-def _too_large_unpacked(error: core.FileTooLarge) -> Problem:
-    return Problem(
-        "upload_too_large",
-        str(error),
-        limit=error.max_bytes,
-        setting=variable_of("max_upload_bytes"),
-    )
+def _too_many_vertices(error: core.TooManyVertices) -> Problem:
+    counts = error.vertices, error.max_vertices
+    return over_limit("limit_exceeded", "vertices", *counts, "max_vertices").problem
 
 
 def _unknown_file_type(error: core.UnknownFileType) -> Problem:
@@ -318,7 +337,7 @@ def _internal_error(_error: BaseException) -> Problem:
 EXCEPTIONS: Sequence[tuple[type[BaseException], Callable[[Any], Problem]]] = (
     (ProblemError, lambda error: error.problem),
     (core.TooManyFaces, _too_many_faces),
-    (core.FileTooLarge, _too_large_unpacked),
+    (core.TooManyVertices, _too_many_vertices),
     (core.UnknownFileType, _unknown_file_type),
     (core.MissingExtra, lambda error: Problem("unsupported_media_type", str(error))),
     (core.InvalidMesh, _invalid_mesh),

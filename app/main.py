@@ -5,13 +5,13 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
 
-from anyio import CapacityLimiter
 from fastapi import FastAPI
 from starlette.middleware.cors import CORSMiddleware
 
 from app import __version__
 from app.http import exception_handlers, page
 from app.http.event_loop import measuring_lag
+from app.http.large_bodies import LargeBodies
 from app.http.metrics import Metrics
 from app.http.middleware.admission import AdmissionMiddleware
 from app.http.middleware.body_timeout import BodyTimeoutMiddleware
@@ -21,6 +21,7 @@ from app.http.middleware.observation import ObservationMiddleware
 from app.http.middleware.probes import PROBES
 from app.http.middleware.request_id import RequestIdMiddleware
 from app.http.openapi import DOCUMENT, SERVERS, TAGS
+from app.http.prefix import path_in
 from app.http.routes import about, jobs, meshes, queries
 from app.service.service import Service
 from app.settings import Settings
@@ -50,13 +51,13 @@ def create_app(settings: Settings) -> FastAPI:
             "operation_spans": False,
             "metrics": False,  # those of Prometheus are more
             "logs": False,
-            "exclude": lambda scope: scope.get("path") in PROBES,
+            "exclude": lambda scope: path_in(scope) in PROBES,
         },
     )
     app.state.service = service
     app.state.metrics = metrics
     app.state.about = about.about(settings)
-    app.state.large_bodies = CapacityLimiter(1)
+    app.state.large_bodies = LargeBodies()
     # The last one added is the outermost.
     app.add_middleware(HeadMiddleware)
     app.add_middleware(BodyTimeoutMiddleware, settings=settings)

@@ -3,6 +3,7 @@
 import os
 import re
 import resource
+from ipaddress import ip_network
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 from urllib.parse import urlsplit
@@ -51,6 +52,14 @@ def _worker_memory(data: dict[str, Any]) -> int:
 
 def _query_bytes(data: dict[str, Any]) -> int:
     return min(4 * MIB, int(data["max_upload_bytes"]))
+
+
+def _scratch_bytes(data: dict[str, Any]) -> int:
+    return 8 * int(data["max_upload_bytes"])
+
+
+def _quota_results(data: dict[str, Any]) -> int | None:
+    return int(data["results_bytes"]) // 2 if data["api_keys"] else None
 
 
 def _connections(_data: dict[str, Any]) -> int:
@@ -109,6 +118,7 @@ def _keys(value: object) -> object:
 Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 _ORIGIN = re.compile(r"\*|https?://[^/\s?#@A-Z]+")
+_PREFIX = re.compile(r"(/[A-Za-z0-9._~-]+)+")
 _HOST = re.compile(r"(\*\.)?[a-z0-9_-]+(\.[a-z0-9_-]+)*|\[[0-9a-f:]+\]")
 
 
@@ -163,10 +173,14 @@ class Settings(BaseSettings):
     """Size of the stored distance fields; only those that took more than 50 ms are stored."""
     max_upload_bytes: PositiveInt = 512 * MIB
     """Largest body of an upload."""
+    scratch_bytes: PositiveInt = Field(default_factory=_scratch_bytes)
+    """Size of the uploads under way, unpacked ones included; by default eight of the largest."""
     max_query_bytes: PositiveInt = Field(default_factory=_query_bytes)
     """Largest body of a query; by default 4 MiB."""
     max_faces: PositiveInt = 5_000_000
     """Most faces of a mesh."""
+    max_vertices: PositiveInt = 3_000_000
+    """Most vertices of a mesh; a closed one has half as many as faces."""
     max_sources: PositiveInt = 10_000
     """Most sources of a query; each point of a curve counts. Large matrices may have more."""
     max_matrix_cells: PositiveInt = 10_000_000
@@ -205,12 +219,18 @@ class Settings(BaseSettings):
     """Size of the meshes that a caller was the first to store; without keys, of all callers."""
     quota_jobs: PositiveInt | None = None
     """Jobs of a caller, until they are removed; without keys, of all callers together."""
+    quota_results_bytes: PositiveInt | None = Field(default_factory=_quota_results)
+    """Size of the answers to a caller's jobs; by default half of all, and all without keys."""
     quota_uploads: PositiveInt | None = None
     """Uploads of a caller that may run at the same time, samples included."""
     max_connections: PositiveInt = Field(default_factory=_connections)
     """Connections that may be open; 1000, or half of the process's descriptors if fewer."""
     max_caller_connections: PositiveInt = Field(default_factory=_caller_connections)
     """Connections from one address; by default a quarter of all. A proxy may need more."""
+    trusted_proxies: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_listed)] = ()
+    """Addresses or networks whose `X-Forwarded-For` names the caller, separated by commas."""
+    root_path: str = ""
+    """Prefix of all addresses, such as `/geodesic`, where a proxy offers the service below it."""
     allowed_hosts: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_listed)] = ()
     """Names that `Host` may have, separated by commas; `*.example.org` allows all subdomains."""
     cors_origins: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_listed)] = ()
@@ -245,6 +265,15 @@ class Settings(BaseSettings):
             raise ValueError("it is not a URL such as redis://user:secret@host:6379")
         return redis
 
+    @field_validator("root_path")
+    @classmethod
+    def _is_a_prefix(cls, path: str) -> str:
+        if path and not _PREFIX.fullmatch(path):
+            raise ValueError(
+                f"{path!r} is not a prefix such as /geodesic, without a slash at its end"
+            )
+        return path
+
     @field_validator("cors_origins")
     @classmethod
     def _are_origins(cls, origins: tuple[str, ...]) -> tuple[str, ...]:
@@ -252,6 +281,18 @@ class Settings(BaseSettings):
             if not _ORIGIN.fullmatch(origin):
                 raise ValueError(f"{origin!r} is not an origin such as https://example.org, nor *")
         return origins
+
+    @field_validator("trusted_proxies")
+    @classmethod
+    def _are_networks(cls, proxies: tuple[str, ...]) -> tuple[str, ...]:
+        for proxy in proxies:
+            try:
+                ip_network(proxy)
+            except ValueError:
+                raise ValueError(
+                    f"{proxy!r} is not an address, nor a network as 10.0.0.0/8"
+                ) from None
+        return proxies
 
     @field_validator("allowed_hosts")
     @classmethod
@@ -298,6 +339,7 @@ class Settings(BaseSettings):
 
 _AT_MOST = (
     ("max_query_bytes", "max_upload_bytes"),
+    ("max_upload_bytes", "scratch_bytes"),
     ("query_memory_bytes", "worker_memory_bytes"),
     ("max_caller_connections", "max_connections"),
 )

@@ -3,6 +3,7 @@
 import argparse
 import os
 import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from benchmarks import (
@@ -27,9 +28,9 @@ from benchmarks.paper import experiments as paper
 from benchmarks.peers import report as peers
 from benchmarks.scaling import measurement as scaling
 from benchmarks.soak import measurement as soak
-from benchmarks.tables import write
+from benchmarks.tables import Section, write
 
-BENCHMARKS = {
+BENCHMARKS: dict[str, Callable[[Inputs, int], Section | Sequence[Section]]] = {
     "topology": topology.run,
     "exact": exact.run,
     "approximate": approximate.run,
@@ -105,9 +106,10 @@ def main() -> None:
             for text in paper.run(inputs, arguments.runs):
                 print(text, flush=True)
             continue
-        section = BENCHMARKS[name](inputs, arguments.runs)
-        print(section.text())
-        write(section, Path(__file__).with_name("RESULTS.md"))
+        sections = BENCHMARKS[name](inputs, arguments.runs)
+        for section in [sections] if isinstance(sections, Section) else sections:
+            print(section.text())
+            write(section, Path(__file__).with_name("RESULTS.md"))
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ from statistics import median
 from threading import Event
 from typing import Any
 
+from benchmarks import greed
 from benchmarks.inputs import Inputs
 from benchmarks.serving import Client, serving
 from benchmarks.tables import Section, rated
@@ -34,7 +35,12 @@ Attack = Callable[[int], None]
 """One blow to the service on a port; it is dealt again and again"""
 
 
-def run(_inputs: Inputs, _runs: int) -> Section:
+def run(_inputs: Inputs, _runs: int) -> Sequence[Section]:
+    """Attack the service: by floods, and by greed."""
+    return _floods(), greed.run()
+
+
+def _floods() -> Section:
     """Attack the service in several ways, one after the other, by two processes each."""
     rows = []
     with (

@@ -6,6 +6,7 @@ They form a tree::
     ├── InvalidMesh             the vertices, the faces or the file cannot be used
     │   ├── UnknownFileType     neither name nor content tell how to read a file
     │   ├── TooManyFaces        more than the caller allows
+    │   ├── TooManyVertices     more than the caller allows
     │   └── FileTooLarge        more bytes than the caller allows
     ├── InvalidPoint            a source or target that is not on the mesh
     ├── InvalidArgument         any other argument out of its domain
@@ -104,6 +105,31 @@ class TooManyFaces(InvalidMesh):
         super().__init__(f"{faces} faces; at most {max_faces} are allowed", kind="face")
         self.faces = faces
         self.max_faces = max_faces
+
+
+class TooManyVertices(InvalidMesh):
+    r"""A file with more than ``max_vertices`` vertices, those without a face included.
+
+    Parameters
+    ----------
+    vertices
+        Number of vertices.
+    max_vertices
+        Number allowed.
+
+    Examples
+    --------
+    >>> text = b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    >>> gc.load_mesh(text, "off", max_vertices=2)
+    Traceback (most recent call last):
+        ...
+    geodesic_core.errors.TooManyVertices: 3 vertices; at most 2 are allowed
+    """
+
+    def __init__(self, vertices: int, max_vertices: int) -> None:
+        super().__init__(f"{vertices} vertices; at most {max_vertices} are allowed", kind="vertex")
+        self.vertices = vertices
+        self.max_vertices = max_vertices
 
 
 class UnknownFileType(InvalidMesh):

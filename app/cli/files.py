@@ -20,7 +20,8 @@ def encoded(answer: "Answer", name: str) -> Iterable[bytes | memoryview]:
     """Return the parts of an answer in the format of a name."""
     from app.encoding import FORMATS, Representation, encode
 
-    return encode(answer, Representation(FORMATS[name])).parts
+    parts, _ = encode(answer, Representation(FORMATS[name]))
+    return parts
 
 
 def write_file(path: Path, parts: Iterable[bytes | memoryview]) -> None:

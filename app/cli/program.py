@@ -80,6 +80,7 @@ for command in (
     meshes.info,
     queries.distance,
     queries.path,
+    queries.steps,
     queries.paths,
     queries.isolines,
     queries.borders,

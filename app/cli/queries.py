@@ -38,24 +38,24 @@ from app.cli.steps import Failure, MeshInput
 from app.cli.summary import bound_in_words, print_bound, print_end, print_seconds, print_size
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
     from app.encoding import Answer
 
-LINES = ".obj", ".csv", ".svg", ".geojson", ".json"
+LINES = ".obj", ".csv", ".json"
 """Suffixes of files that hold lines."""
 
 PointsOut = Annotated[
     Path | None,
     typer.Option(
-        help="Where the points go, too: .csv, .geojson or .json; - prints .csv.",
-        callback=writable(".csv", ".geojson", ".json"),
+        help="Where the points go, too: .csv or .json; - prints .csv.",
+        callback=writable(".csv", ".json"),
     ),
 ]
 LinesOut = Annotated[
     Path | None,
     typer.Option(
-        help="Where the lines go: .obj (polylines), .csv, .svg, .geojson or .json; - prints .csv.",
+        help="Where the lines go: .obj (polylines), .csv or .json; - prints .csv.",
         callback=writable(*LINES),
     ),
 ]
@@ -135,7 +135,7 @@ def path(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Where the path goes: .obj (a polyline), .csv, .svg, .geojson or .json; its "
+            help="Where the path goes: .obj (a polyline), .csv or .json; its "
             "points alone to .npy. - prints .csv.",
             callback=writable(*LINES, ".npy"),
         ),
@@ -148,10 +148,6 @@ def path(
             help="A point to pass on the way; may be repeated, in order.",
         ),
     ] = None,
-    explain: Annotated[
-        bool,
-        typer.Option("--explain", help="Describe each step of the search; exact paths only."),
-    ] = False,
     max_distance: MaxDistance = None,
     method: MethodOption = Method.EXACT,
     relative_error: RelativeError = None,
@@ -165,10 +161,9 @@ def path(
     """Compute a shortest path over the surface between two points."""
     output = Output(out, as_json)
     members = accuracy(method, relative_error, absolute_error, effort)
-    if method is not Method.EXACT and (via or explain):
-        name = "--via" if via else "--explain"
-        raise typer.BadParameter(f"{name} goes with --method exact only")
-    members |= {"explain": explain} | limits(max_distance, barriers)
+    if method is not Method.EXACT and via:
+        raise typer.BadParameter("--via goes with --method exact only")
+    members |= limits(max_distance, barriers)
     points: WrittenMembers = {"source": source, "target": target, "waypoints": via or []}
     answered = ask(
         "path", MeshInput(mesh_file, file_format, merge), "Computing the path", points, members
@@ -182,8 +177,52 @@ def path(
     output.say(f"points      {len(found['points'])}")
     print_bound(output, found["error_bound"])
     print_seconds(output, answered)
-    _print_steps(output, found.get("steps", ()))
     output.say_written()
+
+
+def steps(
+    mesh_file: MeshFile,
+    source: Source,
+    target: Annotated[
+        Point,
+        typer.Option(parser=Point.parse, metavar="POINT", help="The point to go to."),
+    ],
+    via: Annotated[
+        list[Point] | None,
+        typer.Option(
+            parser=Point.parse,
+            metavar="POINT",
+            help="A point to pass on the way; may be repeated, in order.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Where the steps go: .json.", callback=writable(".json")),
+    ] = None,
+    max_distance: MaxDistance = None,
+    barriers: Barriers = None,
+    file_format: FormatOption = None,
+    merge: MergeOption = NO_MERGE,
+    as_json: AsJson = False,
+) -> None:
+    """Tell what the search for a path does, step by step."""
+    output = Output(out, as_json)
+    points: WrittenMembers = {"source": source, "target": target, "waypoints": via or []}
+    answered = ask(
+        "steps",
+        MeshInput(mesh_file, file_format, merge),
+        "Searching",
+        points,
+        limits(max_distance, barriers),
+    )
+    output.write(answered.answer)
+    print_size(output, answered.mesh)
+    for step in answered.answer.members["steps"]:
+        output.say(
+            f"leg {step['leg']}, {step['name']:12} bound {step['bound']!r}, "
+            f"{step['windows']} windows, {len(step['faces'])} faces"
+        )
+    print_end(output, answered)
 
 
 def paths(
@@ -193,8 +232,7 @@ def paths(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Where the paths go: .obj (a polyline each), .csv, .svg, .geojson or .json; - "
-            "prints .csv.",
+            help="Where the paths go: .obj (a polyline each), .csv or .json; - prints .csv.",
             callback=writable(*LINES),
         ),
     ] = None,
@@ -366,15 +404,6 @@ def locate(
     output.say(f"position    {','.join(map(repr, point['position']))}")
     output.say(f"distance    {point['distance']!r}")
     output.say_written()
-
-
-def _print_steps(output: Output, steps: "Iterable[Any]") -> None:
-    """Print what each step of a search has found."""
-    for step in steps:
-        output.say(
-            f"leg {step.leg}, {step.name:12} {1e3 * step.seconds:8.2f} ms, bound {step.bound!r}, "
-            f"{step.windows} windows, {len(step.faces)} faces"
-        )
 
 
 _NO_PATH = {

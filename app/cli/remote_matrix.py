@@ -34,7 +34,7 @@ def write_matrix(wanted: MatrixToWrite, service: str) -> WrittenMatrix:
             mesh_id, matrix = _computed(client, wanted, service)
             with showing("Receiving the matrix") as step:
                 client.save_matrix(matrix, wanted.out, progress=_watched(step))
-            client.dismiss_job(matrix.job_id)  # makes room there
+            client.delete_job(matrix.job_id)  # makes room there
     except GeodesicClientError as error:
         raise Failure(str(error)) from None
     with wanted.out.open("rb") as file:

@@ -17,6 +17,10 @@ from app.engine import fork_server
 if TYPE_CHECKING:
     from app.settings import Settings
 
+_GIVE_WAY_S = 0.0005
+"""Seconds after which a thread that checks a body gives way to the event loop, which waits so long
+for each of its calls; 5 ms by default"""
+
 
 def serve(
     host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
@@ -54,6 +58,7 @@ def serve(
             pass  # the server itself would show a refusal as a traceback
     except (StoreError, StateError) as error:
         raise Failure(str(error)) from error
+    sys.setswitchinterval(_GIVE_WAY_S)
     server = server_of(app, host, port, settings)
     # A closed terminal ends the service in the same order.
     signal(SIGHUP, lambda *_: raise_signal(SIGTERM))

@@ -1,45 +1,40 @@
 """Encoders from answers to bytes: one module for each format, and a registry.
 
 An `Answer` is a JSON object whose members may be arrays. It also has views for other formats: a
-`Table`, lines (`Line`), points (`PointFeature`), a `Surface`. Encoders return an iterator of parts,
+`Table`, lines (`Line`), a `Surface`. Encoders return an iterator of parts,
 so that no answer is in memory as a whole twice.
 """
 
-from app.encoding.answer import Answer, Encoded
+from app.encoding.answer import Answer
 from app.encoding.arrays import array_headers, npy_parts, too_large_for
 from app.encoding.negotiation import coding_quality, negotiate, negotiate_coding
 from app.encoding.registry import encode
 from app.encoding.representation import (
     CSV,
     FORMATS,
-    GEOJSON,
     JSON,
     NPY,
     NPZ,
     OBJ,
     OCTETS,
     PLY,
-    SVG,
     Representation,
 )
-from app.encoding.views import Indices, Line, PointFeature, Surface, Table
+from app.encoding.views import Elements, Indices, Line, Surface, Table
 
 __all__ = [
     "CSV",
     "FORMATS",
-    "GEOJSON",
     "JSON",
     "NPY",
     "NPZ",
     "OBJ",
     "OCTETS",
     "PLY",
-    "SVG",
     "Answer",
-    "Encoded",
+    "Elements",
     "Indices",
     "Line",
-    "PointFeature",
     "Representation",
     "Surface",
     "Table",

@@ -1,10 +1,10 @@
 """Answers of queries, and encoded answers."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
-from app.encoding.views import Line, PointFeature, Surface, Table
+from app.encoding.views import Line, Surface, Table
 
 Buffer = bytes | memoryview
 
@@ -25,7 +25,7 @@ class Answer:
         Names of the members that the views show; the others become headers where they are small.
     values
         Number of values in JSON, where the query could not tell it before; else 0.
-    table, lines, points, surface
+    table, lines, surface
         The views, or functions that make them; None for a view that it lacks. There is at least one
         line.
     """
@@ -36,13 +36,8 @@ class Answer:
     values: int = 0
     table: Table | None = None
     lines: Callable[[], Sequence[Line]] | None = None
-    points: Callable[[], Sequence[PointFeature]] | None = None
     surface: Surface | None = None
 
 
-@dataclass(frozen=True)
-class Encoded:
-    """The parts of a body, made one after the other, and its headers."""
-
-    parts: Iterable[Buffer]
-    headers: Mapping[str, str] = field(default_factory=dict)
+Encoded = tuple[Iterable[Buffer], Mapping[str, str]]
+"""The parts of a body, made one after the other, and the headers that its content gives"""

@@ -15,7 +15,7 @@ from app.errors import ProblemError, problem
 def to_npy(answer: Answer, dtype: str) -> Encoded:
     """Encode the array in numpy's own format."""
     array = _body(answer, dtype)
-    return Encoded(npy_parts(array), array_headers(answer, array.dtype, array.shape))
+    return npy_parts(array), array_headers(answer, array.dtype, array.shape)
 
 
 def npy_parts(array: NDArray[Any]) -> Sequence[Buffer]:
@@ -28,7 +28,7 @@ def npy_parts(array: NDArray[Any]) -> Sequence[Buffer]:
 def to_octets(answer: Answer, dtype: str) -> Encoded:
     """Encode the bytes of the array, without a header."""
     array = _body(answer, dtype)
-    return Encoded([_raw(array)], array_headers(answer, array.dtype, array.shape))
+    return [_raw(array)], array_headers(answer, array.dtype, array.shape)
 
 
 def to_npz(answer: Answer, dtype: str) -> Encoded:
@@ -48,7 +48,7 @@ def to_npz(answer: Answer, dtype: str) -> Encoded:
         data=table.data,
         _is_array=np.array(True),
     )
-    return Encoded([file.getbuffer()], array_headers(answer, distances.dtype, table.shape))
+    return [file.getbuffer()], array_headers(answer, distances.dtype, table.shape)
 
 
 def _body(answer: Answer, dtype: str) -> NDArray[Any]:

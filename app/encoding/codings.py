@@ -36,15 +36,15 @@ CODINGS: Mapping[str, Callable[[], _Compressor]] = {
 
 def compressed(encoded: Encoded, coding: str) -> Encoded:
     """Return a body in a coding of ``CODINGS``; a small one as it is."""
-    parts = iter(encoded.parts)
+    parts, headers = iter(encoded[0]), encoded[1]
     first: list[Buffer] = []
     while sum(map(len, first)) < LEAST:
         part = next(parts, None)
         if part is None:
-            return Encoded(first, encoded.headers)
+            return first, headers
         first.append(part)
-    headers = {**encoded.headers, "Content-Encoding": coding}
-    return Encoded(_through(CODINGS[coding](), chain(first, parts)), headers)
+    body = _through(CODINGS[coding](), chain(first, parts))
+    return body, {**headers, "Content-Encoding": coding}
 
 
 def _through(compressor: _Compressor, parts: Iterator[Buffer]) -> Iterator[Buffer]:

@@ -25,11 +25,6 @@ def colours_of(values: NDArray[np.floating[Any]], largest: float) -> NDArray[np.
     return colours
 
 
-def hex_colour(shade: float) -> str:
-    """Return the colour of a shade from 0 to 1, as ``#rrggbb``."""
-    return f"#{_table()[round(shade * (_STEPS - 1))].tobytes().hex()}"
-
-
 @cache
 def _table() -> NDArray[np.uint8]:
     return np.rint(255.0 * Colormap("viridis").lut(_STEPS)[:, :3]).astype(np.uint8)

@@ -19,7 +19,7 @@ def to_csv(answer: Answer) -> Encoded:
     if table is None:
         assert answer.lines is not None, "an answer in CSV has a table or lines"  # noqa: S101
         table = table_of_lines(answer.lines())
-    return Encoded(_written(table), headers_of(answer, answer.shown))
+    return _written(table), headers_of(answer, answer.shown)
 
 
 def _written(table: Table) -> Iterator[Buffer]:

@@ -8,7 +8,7 @@ import orjson
 from numpy.typing import NDArray
 
 from app.encoding.answer import Answer, Buffer, Encoded
-from app.encoding.views import Indices
+from app.encoding.views import Elements, Indices
 
 _VALUES, _ELEMENTS = 2**11, 2**9
 """Values of arrays, and elements of lists, that are encoded at a time.
@@ -20,7 +20,7 @@ the kernel each time anew: with eight times as many, a million values took twice
 
 def to_json(answer: Answer) -> Encoded:
     """Encode all members."""
-    return Encoded(document(answer.members))
+    return document(answer.members), {}
 
 
 def document(members: Mapping[str, Any]) -> Iterator[Buffer]:
@@ -54,7 +54,7 @@ def _value(value: Any) -> Iterator[Buffer]:
 
 def _rows_at_a_time(value: Any) -> int | None:
     """Return the number of rows of a value that are encoded at a time; None for all."""
-    if not isinstance(value, np.ndarray | Indices | list | tuple):
+    if not isinstance(value, np.ndarray | Indices | Elements | list | tuple):
         return None
     rows = _ELEMENTS
     if isinstance(value, np.ndarray) and value.size:
@@ -62,5 +62,5 @@ def _rows_at_a_time(value: Any) -> int | None:
     return rows if len(value) > rows else None
 
 
-def _as_list(value: NDArray[Any] | Indices) -> list[Any]:
+def _as_list(value: NDArray[Any] | Indices | Elements) -> list[Any]:
     return value.tolist()

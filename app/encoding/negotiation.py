@@ -5,6 +5,11 @@ from functools import lru_cache
 
 from app.encoding.codings import CODINGS
 from app.encoding.representation import FORMATS
+from app.errors import problem
+
+MOST_RANGES = 50
+"""Types or codings that a header may accept; browsers send ten. Thousands take a tenth of a second
+of the event loop."""
 
 
 def negotiate(
@@ -12,7 +17,8 @@ def negotiate(
 ) -> str | None:
     """Return the media type for ``Accept``, or for ``name`` of ``FORMATS``, which overrides it.
 
-    Returns None where none of the ``offers`` is acceptable.
+    Returns None where none of the ``offers`` is acceptable. Raises ``ProblemError`` where a header
+    accepts more than `MOST_RANGES`.
     """
     if name is not None:
         return FORMATS[name] if FORMATS[name] in offers else None
@@ -51,6 +57,10 @@ def coding_quality(accept_encoding: str | None, coding: str) -> float:
 
 
 def _accepted(header: str) -> tuple[tuple[str, float], ...]:
+    count = header.count(",") + 1
+    if count > MOST_RANGES:
+        detail = f"a header accepts {count} types or codings; at most {MOST_RANGES} are allowed"
+        raise problem("header_too_large", detail, limit=MOST_RANGES, actual=count)
     ranges = []
     for item in header.split(","):
         media, *parameters = (part.strip().lower() for part in item.split(";"))

@@ -10,7 +10,7 @@ from app.encoding.views import Line
 def to_obj(answer: Answer) -> Encoded:
     """Encode the lines as ``l`` elements, single points as ``p``."""
     assert answer.lines is not None, "an answer in OBJ has lines"  # noqa: S101
-    return Encoded(_written(answer.lines()), headers_of(answer, answer.shown))
+    return _written(answer.lines()), headers_of(answer, answer.shown)
 
 
 def _written(lines: Sequence[Line]) -> Iterator[Buffer]:

@@ -20,7 +20,7 @@ _RGB = "red", "green", "blue"
 def to_ply(answer: Answer) -> Encoded:
     """Encode the surface."""
     assert answer.surface is not None, "an answer in PLY has a surface"  # noqa: S101
-    return Encoded(ply_of(answer.surface), headers_of(answer, answer.shown))
+    return ply_of(answer.surface), headers_of(answer, answer.shown)
 
 
 def ply_of(surface: Surface) -> Iterator[Buffer]:

@@ -1,7 +1,6 @@
 """The encoder of each media type."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import partial
 
 from app.encoding.answer import Answer, Encoded
@@ -9,24 +8,20 @@ from app.encoding.arrays import to_npy, to_npz, to_octets
 from app.encoding.blocks import joined
 from app.encoding.codings import compressed
 from app.encoding.csv_table import to_csv
-from app.encoding.geojson import to_geojson
 from app.encoding.json_document import to_json
 from app.encoding.obj_lines import to_obj
 from app.encoding.ply_mesh import to_ply
 from app.encoding.representation import (
     ARRAYS,
     CSV,
-    GEOJSON,
     JSON,
     NPY,
     NPZ,
     OBJ,
     OCTETS,
     PLY,
-    SVG,
     Representation,
 )
-from app.encoding.svg_drawing import to_svg
 
 _ENCODERS: Mapping[str, Callable[..., Encoded]] = {
     JSON: to_json,
@@ -36,8 +31,6 @@ _ENCODERS: Mapping[str, Callable[..., Encoded]] = {
     OBJ: to_obj,
     PLY: to_ply,
     CSV: to_csv,
-    SVG: to_svg,
-    GEOJSON: to_geojson,
 }
 
 
@@ -46,6 +39,6 @@ def encode(answer: Answer, representation: Representation) -> Encoded:
     encoder = _ENCODERS[representation.media_type]
     if representation.media_type in ARRAYS:
         encoder = partial(encoder, dtype=representation.dtype)
-    encoded = encoder(answer)
-    encoded = replace(encoded, parts=joined(encoded.parts))
+    parts, headers = encoder(answer)
+    encoded = joined(parts), headers
     return encoded if representation.coding is None else compressed(encoded, representation.coding)

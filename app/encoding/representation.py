@@ -10,8 +10,6 @@ OCTETS = "application/octet-stream"
 OBJ = "model/obj"
 PLY = "model/ply"
 CSV = "text/csv"
-SVG = "image/svg+xml"
-GEOJSON = "application/geo+json"
 
 FORMATS: Mapping[str, str] = {
     "json": JSON,
@@ -21,12 +19,10 @@ FORMATS: Mapping[str, str] = {
     "obj": OBJ,
     "ply": PLY,
     "csv": CSV,
-    "svg": SVG,
-    "geojson": GEOJSON,
 }
 ARRAYS = frozenset({NPY, NPZ, OCTETS})
 """The media types whose numbers have a chosen width."""
-TEXTS = frozenset({JSON, OBJ, CSV, SVG, GEOJSON})
+TEXTS = frozenset({JSON, OBJ, CSV})
 """The media types that are worth compressing: the bytes of float64 are nearly random."""
 
 

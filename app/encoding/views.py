@@ -1,4 +1,4 @@
-"""Views of an answer, for formats without its structure: table, lines, points, surface."""
+"""Views of an answer, for formats without its structure: table, lines, surface."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -32,6 +32,24 @@ class Indices:
         return [None if i < 0 else i for i in self.array.tolist()]
 
 
+class Elements:
+    """The elements of a list, made some at a time, and only for a format that shows them."""
+
+    def __init__(self, count: int, made: Callable[[slice], list[Any]]) -> None:
+        self._count = count
+        self._made = made
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, part: slice) -> list[Any]:
+        return self._made(part)
+
+    def tolist(self) -> list[Any]:
+        """Return all elements."""
+        return self._made(slice(None))
+
+
 Values = NDArray[Any] | Indices
 Column = Values | range
 
@@ -56,23 +74,13 @@ class Line:
     points: NDArray[np.float64]
     """(K, 3), mesh units; empty where there is no line"""
     properties: Mapping[str, Any]
-    """Values for GeoJSON and CSV, under the same names in all lines of an answer"""
+    """Values for CSV, under the same names in all lines of an answer"""
     group: str = ""
     """The group in OBJ; lines of one group follow one another"""
     is_closed: bool = False
     """Whether it leads back from its last point to the first, which is not repeated"""
-    shade: float = 0.0
-    """The colour, from 0 to 1"""
     at_points: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     """Columns of K values for the points in CSV, under the same names in all lines"""
-
-
-@dataclass(frozen=True)
-class PointFeature:
-    """A point with its properties in GeoJSON; None for a point that was not found."""
-
-    position: Sequence[float] | None
-    properties: Mapping[str, Any]
 
 
 @dataclass(frozen=True)

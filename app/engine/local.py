@@ -17,7 +17,7 @@ import geodesic_core as gc
 from app.engine.interface import Load, ProgressCallback, UnclaimedCallback, ignore_unclaimed
 from app.engine.queue import FairQueue
 from app.engine.slot import Slot, WorkerLostError
-from app.engine.work import Outcome, Task, TaskResult
+from app.engine.work import Outcome, StoreMesh, Task, TaskResult
 from app.engine.worker import WorkerConfig
 from app.engine.worker_process import FIRST_KERNELS
 from app.errors import Problem, ProblemError, draining, over_limit, problem
@@ -171,7 +171,7 @@ class LocalEngine:
             result = outcome.result()
         except asyncio.CancelledError:
             self._cancelled += 1
-            self._spawn(self._stop_work(slot, outcome))
+            self._spawn(self._stop_work(slot, task, outcome))
             raise
         except WorkerLostError:
             slot.retire()
@@ -179,14 +179,16 @@ class LocalEngine:
         self._release(slot)
         return result
 
-    async def _stop_work(self, slot: Slot, outcome: "asyncio.Future[Outcome]") -> None:
+    async def _stop_work(self, slot: Slot, task: Task, outcome: "asyncio.Future[Outcome]") -> None:
         """Stop work that nobody waits for: ask first, and kill the worker if that fails.
 
-        The reading of a mesh cannot be stopped, but mostly ends in time. A new worker takes a
-        second or two to start.
+        A new worker takes a second or two to start, and its caches are empty. The steps of making a
+        mesh may take seconds each, whatever a client waits: they get the time of a request.
         """
+        is_mesh, settings = isinstance(task.work, StoreMesh), self._settings
         slot.ask_to_stop()
-        await asyncio.wait({outcome}, timeout=self._settings.cancel_grace_s)
+        grace_s = settings.deadline_s if is_mesh else settings.cancel_grace_s
+        await asyncio.wait({outcome}, timeout=grace_s)
         if not outcome.done() or outcome.exception() is not None:
             slot.retire()
             return

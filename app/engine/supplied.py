@@ -7,7 +7,6 @@ from contextlib import contextmanager, suppress
 
 from app.engine.interface import Engine, Load, ProgressCallback, UnclaimedCallback, ignore_unclaimed
 from app.engine.work import (
-    EstimateQuery,
     JoinParts,
     MeshFromFile,
     StoreMesh,
@@ -90,8 +89,6 @@ class SuppliedEngine:
         """Do the work of a task, see ``Engine``."""
         if isinstance(task.work, StoreMesh):
             return await self._store(task, task.work, on_progress)
-        if isinstance(task.work, EstimateQuery):
-            return await self._compute(task, task.work, on_progress)
         with self._using(task.work.result_name):
             done = await self._compute(task, task.work, on_progress)
             if done.result is not None and done.result.has_files:
@@ -118,7 +115,7 @@ class SuppliedEngine:
             pass
 
     async def _compute(
-        self, task: Task, work: WritesResult | EstimateQuery, on_progress: ProgressCallback
+        self, task: Task, work: WritesResult, on_progress: ProgressCallback
     ) -> TaskResult:
         mesh_id = work.query.mesh_id
         parts = work.parts if isinstance(work, JoinParts) else ()

@@ -27,7 +27,6 @@ import msgspec
 from app.encoding import Representation
 from app.engine.work import (
     ComputePart,
-    EstimateQuery,
     JoinParts,
     MeshFromFile,
     MeshFromSample,
@@ -40,7 +39,7 @@ from app.engine.work import (
     Work,
 )
 from app.errors import CODES, Problem
-from app.queries import KINDS, Estimate, MatrixQuery, Query
+from app.queries import KINDS, MatrixQuery, Query
 from app.store.meshes import WrittenMesh
 from app.store.results import Result, ResultManifest
 from app.tracing import Period
@@ -97,35 +96,28 @@ class _Query(msgspec.Struct, frozen=True):
     mesh_id: str
     request: bytes
     """As JSON, see `Query.written`"""
+    representation: Representation
 
 
 class _Run(msgspec.Struct, frozen=True, tag="run"):
     query: _Query
-    representation: Representation
     result_name: str
 
 
 class _Part(msgspec.Struct, frozen=True, tag="part"):
     query: _Query
-    dtype: str
     part: int
     result_name: str
 
 
 class _Join(msgspec.Struct, frozen=True, tag="join"):
     query: _Query
-    dtype: str
     parts: Sequence[str]
     reached: int
     result_name: str
 
 
-class _Estimate(msgspec.Struct, frozen=True, tag="estimate"):
-    query: _Query
-    representation: Representation
-
-
-_Work = _Store | _Run | _Part | _Join | _Estimate
+_Work = _Store | _Run | _Part | _Join
 
 
 class _Task(msgspec.Struct, frozen=True):
@@ -159,7 +151,6 @@ class _Done(msgspec.Struct, frozen=True, tag="done"):
     periods: dict[str, Period]
     mesh: _Mesh | None
     result: _Result | None
-    estimate: Estimate | None
 
 
 class _Refused(msgspec.Struct, frozen=True, tag="refused"):
@@ -220,7 +211,6 @@ class Wire:
                         dict(outcome.periods),
                         self._mesh_out(outcome.mesh),
                         _result_out(outcome.result),
-                        outcome.estimate,
                     )
                 )
             case Problem():
@@ -237,7 +227,6 @@ class Wire:
                     done.periods,
                     self._mesh_in(done.mesh),
                     _result_in(done.result),
-                    done.estimate,
                 )
             case _Refused(problem):
                 if problem.code not in CODES:
@@ -250,28 +239,24 @@ class Wire:
         match work:
             case StoreMesh(mesh_input, folder, owner, name):
                 return _Store(self._input_out(mesh_input), self._path_out(folder), owner, name)
-            case RunQuery(query, representation, name):
-                return _Run(_query_out(query), representation, name)
-            case ComputePart(query, dtype, part, name):
-                return _Part(_query_out(query), dtype, part, name)
-            case JoinParts(query, dtype, parts, reached, name):
-                return _Join(_query_out(query), dtype, list(parts), reached, name)
-            case EstimateQuery(query, representation):
-                return _Estimate(_query_out(query), representation)
+            case RunQuery(query, name):
+                return _Run(_query_out(query), name)
+            case ComputePart(query, part, name):
+                return _Part(_query_out(query), part, name)
+            case JoinParts(query, parts, reached, name):
+                return _Join(_query_out(query), list(parts), reached, name)
 
     def _work_in(self, work: _Work) -> Work:
         match work:
             case _Store(mesh_input, folder, owner, name):
                 return StoreMesh(self._input_in(mesh_input), self._path_in(folder), owner, name)
-            case _Run(query, representation, name):
-                return RunQuery(_query_in(query), representation, _inside(name))
-            case _Part(query, dtype, part, name):
-                return ComputePart(_matrix_in(query), dtype, part, _inside(name))
-            case _Join(query, dtype, parts, reached, name):
+            case _Run(query, name):
+                return RunQuery(_query_in(query), _inside(name))
+            case _Part(query, part, name):
+                return ComputePart(_matrix_in(query), part, _inside(name))
+            case _Join(query, parts, reached, name):
                 names = tuple(map(_inside, parts))
-                return JoinParts(_matrix_in(query), dtype, names, reached, _inside(name))
-            case _Estimate(query, representation):
-                return EstimateQuery(_query_in(query), representation)
+                return JoinParts(_matrix_in(query), names, reached, _inside(name))
 
     def _input_out(self, given: MeshInput) -> _Sample | _File:
         match given:
@@ -350,7 +335,7 @@ def _inside(path: str) -> str:
 
 
 def _query_out(query: Query[Any]) -> _Query:
-    return _Query(query.kind, query.mesh_id, query.written)
+    return _Query(query.kind, query.mesh_id, query.written, query.representation)
 
 
 def _query_in(query: _Query) -> Query[Any]:
@@ -358,7 +343,8 @@ def _query_in(query: _Query) -> Query[Any]:
     if kind is None:
         raise DamagedMessageError(f"there is no kind of query {query.kind!r}")
     try:
-        return kind(_inside(query.mesh_id), kind.model.model_validate_json(query.request))
+        request = kind.model.model_validate_json(query.request)
+        return kind(_inside(query.mesh_id), request, representation=query.representation)
     except ValueError as error:
         raise DamagedMessageError(f"the query of kind {query.kind} cannot be read") from error
 

@@ -5,9 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from app.encoding import Representation
 from app.errors import Problem
-from app.queries import Estimate, MatrixQuery, Query
+from app.queries import MatrixQuery, Query
 from app.schemas.meshes import Merge
 from app.store.meshes import WrittenMesh
 from app.store.results import Result
@@ -53,7 +52,6 @@ class RunQuery:
     """Answer a query, and write the answer as the result ``result_name``."""
 
     query: Query[Any]
-    representation: Representation
     result_name: str
 
 
@@ -62,7 +60,6 @@ class ComputePart:
     """Compute a part of a large matrix, and write it as the result ``result_name``."""
 
     query: MatrixQuery
-    dtype: str
     part: int
     result_name: str
 
@@ -72,7 +69,6 @@ class JoinParts:
     """Write a large matrix, whose parts are results, as the result ``result_name``."""
 
     query: MatrixQuery
-    dtype: str
     parts: Sequence[str]
     """Names of their results"""
     reached: int
@@ -80,18 +76,10 @@ class JoinParts:
     result_name: str
 
 
-@dataclass(frozen=True)
-class EstimateQuery:
-    """Estimate the cost of the answer to a query."""
-
-    query: Query[Any]
-    representation: Representation
-
-
 WritesResult = RunQuery | ComputePart | JoinParts
 """Work that ends with a result of a name: whoever else asks for it can wait for the same"""
 
-Work = StoreMesh | WritesResult | EstimateQuery
+Work = StoreMesh | WritesResult
 
 
 @dataclass(frozen=True)
@@ -119,7 +107,6 @@ class TaskResult:
     """Begin and end of each phase, for traces"""
     mesh: WrittenMesh | None = None
     result: Result | None = None
-    estimate: Estimate | None = None
 
 
 Outcome = TaskResult | Problem | None

@@ -20,7 +20,6 @@ from app.engine.priority import low_priority_thread
 from app.engine.signals import Signals
 from app.engine.work import (
     ComputePart,
-    EstimateQuery,
     JoinParts,
     MeshFromFile,
     MeshFromSample,
@@ -31,7 +30,7 @@ from app.engine.work import (
     TaskResult,
     Work,
 )
-from app.errors import ProblemError, problem_of
+from app.errors import ProblemError, problem_of, too_large_unpacked
 from app.queries import (
     SMALL_SECONDS,
     ExecutionContext,
@@ -39,14 +38,14 @@ from app.queries import (
     Query,
     Unwritten,
     code_version,
-    estimate,
 )
 from app.queries.validation import check_json_size
-from app.settings import Settings, variable_of
+from app.settings import Settings
 from app.store.fields import FieldStore
 from app.store.lru_cache import LRUCache
 from app.store.meshes import MeshStore, OpenMesh
 from app.store.results import Buffer, body_path, write_result, write_result_file
+from app.store.scratch import most_unpacked
 from app.tracing import Period
 
 logger = structlog.get_logger(module=__name__)
@@ -99,7 +98,7 @@ class Worker:
             return None
         except MemoryError as error:
             self._forget_all()  # caches count as well
-            limit, setting = self.settings.worker_memory_bytes, variable_of("worker_memory_bytes")
+            limit, setting = self.settings.worker_memory_bytes, "worker_memory_bytes"
             return replace(problem_of(error), limit=limit, setting=setting)
         except Exception as error:
             problem = problem_of(error)
@@ -132,15 +131,15 @@ class Worker:
                 return self._compute_part(work, clock, is_cancelled)
             case JoinParts():
                 return self._join_parts(work, clock, is_cancelled)
-            case EstimateQuery():
-                return self._estimate(work, clock, is_cancelled)
 
     def _store(self, work: StoreMesh, clock: "Clock", cancel: Callable[[], bool]) -> TaskResult:
         try:
             with clock.phase("load"):
-                mesh = _make_mesh(work.mesh_input, self.settings)
+                mesh = _make_mesh(work.mesh_input, self.settings, cancel)
+            _stop_if(cancel)
             with clock.phase("store"):
-                written = self.store.write_aside(mesh, work.folder, work.owner, work.name)
+                check = partial(_stop_if, cancel)
+                written = self.store.write_aside(mesh, work.folder, work.owner, work.name, check)
         except FileNotFoundError:
             if cancel():  # then the upload and the scratch folder are removed
                 raise gc.errors.Cancelled from None
@@ -162,15 +161,15 @@ class Worker:
         with self._blaming_damage(opened):
             with clock.phase("compute"):
                 answer = work.query.answer(opened, context)
-            if work.representation.media_type == JSON:
+            if work.query.representation.media_type == JSON:
                 check_json_size(answer.values, settings.max_json_values, work.query.hint)
             with clock.phase("encode"):
-                encoded = encode(answer, work.representation)
+                parts, headers = encode(answer, work.query.representation)
                 result = write_result(
                     self.config.results,
                     work.result_name,
-                    self._verified_parts(encoded.parts, opened, cancel),
-                    encoded.headers,
+                    self._verified_parts(parts, opened, cancel),
+                    headers,
                     code_version(),
                     is_cheap=clock.seconds["compute"] < SMALL_SECONDS,
                 )
@@ -182,7 +181,7 @@ class Worker:
         with clock.phase("load"):
             opened = self._open(work.query)
         with self._blaming_damage(opened):
-            with clock.phase("compute"), _refusing_overflow(work.dtype):
+            with clock.phase("compute"), _refusing_overflow(work.query.representation.dtype):
                 parts = self._parts_of(work, opened, cancel)
                 rows = parts.compute(
                     work.part,
@@ -217,7 +216,7 @@ class Worker:
             parts = self._parts_of(work, opened, cancel)
             answer = work.query.answer_of_parts(opened, work.reached, cancel)
         with clock.phase("encode"):
-            headers = array_headers(answer, np.dtype(work.dtype), parts.shape)
+            headers = array_headers(answer, np.dtype(work.query.representation.dtype), parts.shape)
             write, check = partial(parts.write, part=part), partial(_stop_if, cancel)
             name = work.result_name
             result = write_result_file(root, name, write, headers, code_version(), check)
@@ -227,20 +226,11 @@ class Worker:
         self, work: ComputePart | JoinParts, opened: OpenMesh, cancel: Callable[[], bool]
     ) -> gc.MatrixParts:
         """Return the parts of a matrix; many of them come one after the other."""
-        made, question = self._matrix, (work.query.written, work.dtype)
+        made, question = self._matrix, (work.query.written, work.query.representation.dtype)
         if made is None or made.opened is not opened or made.question != question:
-            parts = work.query.parts(opened, work.dtype, cancel)
+            parts = work.query.parts(opened, cancel)
             made = self._matrix = _Matrix(opened, question, parts)
         return made.parts
-
-    def _estimate(
-        self, work: EstimateQuery, clock: "Clock", cancel: Callable[[], bool]
-    ) -> TaskResult:
-        with clock.phase("load"):
-            opened = self._open(work.query)
-        with clock.phase("compute"):
-            estimated = estimate(work.query, work.representation, opened, cancel)
-        return TaskResult(clock.seconds, clock.periods, estimate=estimated)
 
     def _write_fields(self, fields: Sequence[Unwritten]) -> None:
         self.fields.write(fields)
@@ -313,7 +303,7 @@ class Worker:
 
 def _stop_if(cancel: Callable[[], bool]) -> None:
     if cancel():
-        raise gc.errors.Cancelled("cancelled while the answer was written")
+        raise gc.errors.Cancelled("cancelled between two steps of the work")
 
 
 @contextmanager
@@ -341,28 +331,40 @@ class Clock:
         self.periods[name] = Period(start_ns, time_ns())
 
 
-def _make_mesh(mesh_input: MeshInput, settings: Settings) -> gc.TriangleMesh:
-    max_faces = settings.max_faces
+def _make_mesh(
+    mesh_input: MeshInput, settings: Settings, cancel: Callable[[], bool]
+) -> gc.TriangleMesh:
+    max_faces, max_vertices = settings.max_faces, settings.max_vertices
     faces: NDArray[np.int32] | NDArray[np.int64]
+    sample: gc.TriangleMesh | None = None
     match mesh_input:
         case MeshFromSample():
             sample = gc.samples.SAMPLES[mesh_input.sample](mesh_input.faces)
-            if len(sample.faces) <= max_faces and mesh_input.merge == "none":
-                return sample
             vertices, faces = sample.vertices, sample.faces
-        case MeshFromFile(file_type="json"):
-            refuse_beyond_limit(_JSON_GROWS * mesh_input.path.stat().st_size)
-            vertices, faces = read_json_mesh(mesh_input.path.read_bytes())
-        case MeshFromFile():
-            return gc.load_mesh(
-                mesh_input.path,
-                mesh_input.file_type,
-                mesh_input.merge,
-                max_faces=max_faces,
-                max_bytes=settings.max_upload_bytes,
-            )
+        case MeshFromFile(path=path, file_type="json"):
+            refuse_beyond_limit(_JSON_GROWS * path.stat().st_size)
+            vertices, faces = read_json_mesh(path.read_bytes())
+        case MeshFromFile(path=path):
+            max_bytes = most_unpacked(path.stat().st_size, settings.max_upload_bytes)
+            try:
+                return gc.load_mesh(
+                    path,
+                    mesh_input.file_type,
+                    mesh_input.merge,
+                    max_faces=max_faces,
+                    max_vertices=max_vertices,
+                    max_bytes=max_bytes,
+                    cancel=cancel,
+                )
+            except gc.errors.FileTooLarge:
+                raise too_large_unpacked(max_bytes, settings.max_upload_bytes) from None
     if len(faces) > max_faces:
         raise gc.errors.TooManyFaces(len(faces), max_faces)
+    if len(vertices) > max_vertices:
+        raise gc.errors.TooManyVertices(len(vertices), max_vertices)
+    if sample is not None and mesh_input.merge == "none":
+        return sample
+    _stop_if(cancel)
     return gc.TriangleMesh(vertices, faces, merge=mesh_input.merge)
 
 

@@ -25,6 +25,9 @@ from app.service.service import Service
 
 T = TypeVar("T")
 
+_MOST_PREFERENCES = 50
+"""Preferences of `Prefer` that are looked at"""
+
 _PROMPT_S = 0.02
 """Seconds of work before a disconnect is listened for: small requests end sooner."""
 
@@ -95,11 +98,19 @@ def job_after(prefer: str | None) -> int | None:
 
     None: for an answer, however long it takes.
     """
-    preferences = [part.partition(";")[0].strip().lower() for part in (prefer or "").split(",")]
+    parts = (prefer or "").split(",", _MOST_PREFERENCES)[:_MOST_PREFERENCES]
+    preferences = [part.partition(";")[0].strip().lower() for part in parts]
     if "respond-async" not in preferences:
         return None
     waits = (re.fullmatch(r'wait\s*=\s*"?([0-9]{1,9})"?', each) for each in preferences)
     return next((int(wait[1]) for wait in waits if wait), 0)
+
+
+def refuse_idempotency_key(request: Request) -> None:
+    """Refuse a key of a job in a request that makes none."""
+    if "idempotency-key" in request.headers:
+        detail = "Idempotency-Key goes with Prefer: respond-async only"
+        raise problem("idempotency_key_unused", detail)
 
 
 def require_json(request: Request) -> None:

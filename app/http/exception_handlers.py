@@ -13,6 +13,7 @@ from starlette.routing import compile_path
 from app.errors import EXCEPTIONS, Fault, Problem, ProblemError, pointer, problem_of_status
 from app.http.failures import CLIENT_CLOSED, note_failure
 from app.http.middleware.request_id import body_too_large
+from app.http.prefix import path_in, prefix_of
 from app.http.responses import problem_response
 from app.schemas.points import TAGS
 from app.settings import Settings
@@ -36,7 +37,7 @@ def install(app: FastAPI, settings: Settings) -> None:
         detail = f"{request.method} {request.url.path}: {error.detail}"
         headers = error.headers
         if error.status_code == 405:
-            headers = _allow(app, request.url.path) or headers
+            headers = _allow(app, path_in(request.scope)) or headers
         return _respond(request, problem_of_status(error.status_code, detail, headers))
 
     async def on_disconnect(_request: Request, _error: ClientDisconnect) -> Response:
@@ -85,4 +86,5 @@ def _pointer(location: Sequence[str | int]) -> str:
 
 
 def _respond(request: Request, problem: Problem) -> Response:
-    return problem_response(problem, request.url.path, request.state.request_id)
+    path, prefix = request.url.path, prefix_of(request.scope)
+    return problem_response(problem, path, request.state.request_id, prefix)

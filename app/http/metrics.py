@@ -113,7 +113,7 @@ class Metrics(Collector):
         workers = {"idle": load.idle, "busy": load.busy, "missing": load.missing}
         yield _gauges("geodesic_workers", "Slots for worker processes", "state", workers)
         yield _counter("geodesic_workers_lost", "Workers that died or were killed", load.lost)
-        stopped = "Tasks stopped while they ran: by hang-up, deadline, or dismissal of a job"
+        stopped = "Tasks stopped while they ran: by hang-up, deadline, or the end of its job"
         yield _counter("geodesic_cancellations", stopped, load.cancelled)
         lookups = "Lookups of answers in the store"
         yield _counters("geodesic_results_lookups", lookups, "outcome", service.answering.lookups)

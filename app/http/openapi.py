@@ -5,17 +5,14 @@ It is generated ahead of time by ``python -m app.cli.openapi``: that takes a qua
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from copy import deepcopy
 from pathlib import Path
-from typing import Any, Literal
-
-from pydantic import BaseModel
-from pydantic.json_schema import models_json_schema
+from typing import Any
 
 from app.encoding import JSON
 from app.errors import PROBLEM_JSON
 from app.http.middleware.admission import is_open
 from app.http.responses import documented, problems
-from app.schemas.geojson import FeatureCollection
 
 _SOURCES = Path(__file__).parents[2] / "openapi"
 _PACKAGED = Path(__file__).parents[1] / "openapi.json"
@@ -36,7 +33,6 @@ _EVERYWHERE = (
     "deadline_exceeded",
 )
 """Codes of the problems that any request can meet"""
-_PROBLEM = {"schema": {"$ref": "#/components/schemas/ProblemDocument"}}
 SERVERS = [
     {"url": "/", "description": "The service that this document comes from"},
     {"url": "http://127.0.0.1:8000", "description": "`geodesic serve` on this machine"},
@@ -47,8 +43,7 @@ TAGS = [
         "name": "queries",
         "description": "Distances, paths, isolines, borders, matrices and nearest points on a "
         "stored mesh. Each query answers in JSON, or in other formats by `Accept` or `format`. "
-        "With `estimate=true` it answers with its expected cost instead; `kind` tells the two "
-        "apart. With `Prefer: respond-async` it becomes a job.",
+        "With `Prefer: respond-async` it becomes a job.",
     },
     {
         "name": "meshes",
@@ -102,11 +97,28 @@ _HEADERS = {
     "WWW-Authenticate": _header("`Bearer`, with the error if a key was sent"),
     "X-Request-ID": _header("The id of the request, from the client or newly made; the log has it"),
 }
-_HEADERS_OF_STATUS = {
-    "401": ("WWW-Authenticate",),
-    "409": ("Retry-After",),
-    "429": ("Retry-After",),
-    "503": ("Retry-After",),
+_PROBLEM_OF_STATUS = {
+    "401": "Unauthorized",
+    "409": "ProblemForNow",
+    "429": "ProblemForNow",
+    "503": "ProblemForNow",
+}
+"""The kind of problem that a status answers with, where it is not just a `Problem`"""
+
+
+def _problem(description: str, *headers: str) -> dict[str, Any]:
+    schema = {"$ref": "#/components/schemas/ProblemDocument"}
+    return {
+        "description": description,
+        "headers": documented("X-Request-ID", *headers),
+        "content": {PROBLEM_JSON: {"schema": schema}},
+    }
+
+
+_PROBLEMS = {
+    "Problem": _problem("A problem"),
+    "ProblemForNow": _problem("A problem that will pass", "Retry-After"),
+    "Unauthorized": _problem("A key is missing or wrong", "WWW-Authenticate"),
 }
 _CONDITION = {
     "name": "If-None-Match",
@@ -148,12 +160,13 @@ def complete(document: dict[str, Any]) -> dict[str, Any]:
     components = document["components"]
     for name in ("HTTPValidationError", "ValidationError", "BareVertex", "BareVertexSource"):
         components["schemas"].pop(name, None)
-    components["schemas"] |= _schemas_of(FeatureCollection) | {"JobEvents": _JOB_EVENTS}
+    components["schemas"]["JobEvents"] = _JOB_EVENTS
     for schema in components["schemas"].values():
         for member in schema.get("properties", {}).values():
             _describe_default(member)
     components["securitySchemes"] = {"apiKey": _SECURITY_SCHEME}
     components["headers"] = _HEADERS
+    components["responses"] = _PROBLEMS
     return document
 
 
@@ -171,15 +184,6 @@ def _describe_default(member: dict[str, Any]) -> None:
         default = json.dumps(member.pop("default")).strip('"')
         texts = [member.get("description"), f"Default: `{default}`"]
         member["description"] = ". ".join(filter(None, texts))
-
-
-def _schemas_of(*models: type[BaseModel]) -> dict[str, Any]:
-    """Return the schemas of models that no route names, and of all that they contain."""
-    modes: list[tuple[type[BaseModel], Literal["serialization"]]]
-    modes = [(model, "serialization") for model in models]
-    _, schemas = models_json_schema(modes, ref_template="#/components/schemas/{model}")
-    definitions: dict[str, Any] = schemas["$defs"]
-    return definitions
 
 
 def _leave_out_null(schema: dict[str, Any]) -> None:
@@ -211,13 +215,13 @@ def _responses(
         codes = [*described.split(", "), *refusal["description"].split(", ")]
         answers[str(status)] = {"description": ", ".join(dict.fromkeys(filter(None, codes)))}
     for status in sorted(answers):
-        names = ("X-Request-ID", *_HEADERS_OF_STATUS.get(status, ()))
-        response = {
-            **answers[status],
-            "headers": answers[status].get("headers", {}) | documented(*names),
-        }
         if status >= "400":
-            response["content"] = {PROBLEM_JSON: dict(_PROBLEM)}
+            kind = _PROBLEM_OF_STATUS.get(status, "Problem")
+            codes = answers[status]["description"]
+            yield status, {"$ref": f"#/components/responses/{kind}", "description": codes}
+            continue
+        headers = answers[status].get("headers", {}) | documented("X-Request-ID")
+        response = {**answers[status], "headers": headers}
         for content in response.get("content", {}).values():
             if "itemSchema" in content:  # belongs to OpenAPI 3.2, and the document to 3.1
                 content.clear()
@@ -240,8 +244,13 @@ def _add_example(operation: dict[str, Any], name: str, example: Mapping[str, Any
             parameter.setdefault("examples", {})[name] = shown
     if parameters:
         raise ValueError(f"{operation['operationId']} has no parameter {', '.join(parameters)}")
-    bodies = [(operation.get("requestBody"), example.get("body"))]
-    bodies.append((operation["responses"][str(answer["status"])], answer.get("body")))
+    status = str(answer["status"])
+    response = operation["responses"][status]
+    if "$ref" in response:  # the example is of this operation alone
+        kind = response["$ref"].rpartition("/")[2]
+        response = deepcopy(_PROBLEMS[kind]) | {"description": response["description"]}
+        operation["responses"][status] = response
+    bodies = [(operation.get("requestBody"), example.get("body")), (response, answer.get("body"))]
     for part, body in bodies:
         if part is not None and body is not None:
             shown = {**summary, "value": body["value"]}

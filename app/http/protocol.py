@@ -28,6 +28,8 @@ STALLED_S = 60.0
 """Seconds that a client may leave its answer unread."""
 LINGER_S = 1.0
 """Seconds in which a client can read a refusal: a socket closed at once would discard it."""
+MOST_DRAINED = 256 * 1024
+"""Bytes that a refused client may still send; then nothing more is read."""
 
 
 class BoundedHttpProtocol(HttpToolsProtocol):
@@ -41,6 +43,7 @@ class BoundedHttpProtocol(HttpToolsProtocol):
         self._all_connections = connections
         self._refusal: Problem | None = None
         self._is_refused = False
+        self._drained_bytes = 0
         self._is_in_head = False
         self._head_bytes = 0
         self._unparsed_bytes = 0  # received since the parser reported an element
@@ -77,6 +80,9 @@ class BoundedHttpProtocol(HttpToolsProtocol):
         """Parse what a client sent, unless it has been refused."""
         self.chunks_of_read = 0
         if self._is_refused:
+            self._drained_bytes += len(data)
+            if self._drained_bytes >= MOST_DRAINED:
+                self.transport.pause_reading()
             return
         self._unparsed_bytes += len(data)
         super().data_received(data)  # type: ignore[arg-type]
@@ -190,7 +196,7 @@ class BoundedHttpProtocol(HttpToolsProtocol):
                 self.transport.close()
                 return
         request_id = uuid4().hex
-        response = problem_response(problem, "/", request_id)
+        response = problem_response(problem, "/", request_id, self.root_path)
         response.headers.update({**common_headers(request_id), "Connection": "close"})
         head = b"".join(b"%b: %b\r\n" % header for header in response.raw_headers)
         self.transport.write(STATUS_LINE[problem.status] + head + b"\r\n" + bytes(response.body))

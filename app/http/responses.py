@@ -19,7 +19,6 @@ from starlette.types import Receive, Scope, Send
 from app.encoding import JSON
 from app.errors import CODES, PROBLEM_JSON, Problem
 from app.jobs import Job
-from app.queries import Estimate
 from app.schemas.service import ProblemDocument
 from app.service.answering import PhaseSeconds
 from app.service.service import Manifest
@@ -58,9 +57,9 @@ def common_headers(request_id: str) -> dict[str, str]:
     return {"X-Request-ID": request_id, "X-Content-Type-Options": "nosniff"}
 
 
-def problem_response(problem: Problem, instance: str, request_id: str) -> Response:
+def problem_response(problem: Problem, instance: str, request_id: str, prefix: str) -> Response:
     """Return ``problem`` as ``application/problem+json``."""
-    body = orjson.dumps(problem.document(instance, request_id))
+    body = orjson.dumps(problem.document(instance, request_id, prefix))
     headers = {"Cache-Control": "no-store", **problem.headers}
     return Response(body, problem.status, headers, PROBLEM_JSON)
 
@@ -112,15 +111,19 @@ def not_modified(request: Request, etag: str, headers: Mapping[str, str]) -> Res
     return None
 
 
-def estimate_response(
-    mesh_id: str, estimate: Estimate, media_type: str, seconds: PhaseSeconds
-) -> Response:
-    """Return an estimate, which no client should store: it depends on this machine."""
-    members = {"kind": "estimate", "mesh_id": mesh_id, **vars(estimate), "media_type": media_type}
-    return Response(orjson.dumps(members), 200, {**UNSTORED, **server_timing(seconds)}, JSON)
+def listed_mesh(manifest: Manifest) -> dict[str, Any]:
+    """Return the members of a mesh in a list."""
+    report = manifest["report"]
+    return {
+        "id": manifest["id"],
+        "name": manifest.get("name"),  # earlier releases stored none
+        "vertices": report["vertices"],
+        "faces": report["faces"],
+        "created": manifest["created"],
+    }
 
 
-def mesh_document(manifest: Manifest) -> dict[str, Any]:
+def mesh_document(manifest: Manifest, prefix: str) -> dict[str, Any]:
     """Return the document of a mesh: its report, and the links to its arrays."""
     mesh_id = manifest["id"]
     names = [name for name, stored in PUBLIC_ARRAYS.items() if stored in manifest["crc32"]]
@@ -130,13 +133,13 @@ def mesh_document(manifest: Manifest) -> dict[str, Any]:
         **manifest["report"],
         "warnings": manifest["warnings"],
         "created": manifest["created"],
-        "arrays": {name: f"/v1/meshes/{mesh_id}/arrays/{name}" for name in names},
+        "arrays": {name: f"{prefix}/v1/meshes/{mesh_id}/arrays/{name}" for name in names},
     }
 
 
-def job_document(job: Job) -> dict[str, Any]:
+def job_document(job: Job, prefix: str) -> dict[str, Any]:
     """Return the document of a job."""
-    here = f"/v1/jobs/{job.id}"
+    here = f"{prefix}/v1/jobs/{job.id}"
     members = {
         "id": job.id,
         "kind": job.spec.kind,
@@ -149,13 +152,14 @@ def job_document(job: Job) -> dict[str, Any]:
         "links": {"self": here, "results": f"{here}/results", "events": f"{here}/events"},
     }
     if job.problem is not None:
-        members["problem"] = job.problem.document(f"{here}/results", job.spec.request_id)
+        instance, request_id = f"{here}/results", job.spec.request_id
+        members["problem"] = job.problem.document(instance, request_id, prefix)
     return members
 
 
-def accepted_response(job: Job) -> Response:
+def accepted_response(job: Job, prefix: str) -> Response:
     """Return the 202 for a query that has become a job."""
-    document = job_document(job)
+    document = job_document(job, prefix)
     location = {"Location": document["links"]["self"], "Preference-Applied": "respond-async"}
     return Response(orjson.dumps(document), 202, {**UNSTORED, **location}, JSON)
 

@@ -59,10 +59,13 @@ def server_of(app: FastAPI, host: str, port: int, settings: Settings) -> Drainin
         host,
         port,
         http=cast(Any, connect),
+        root_path=settings.root_path,
         ws="none",
         timeout_graceful_shutdown=math.ceil(settings.drain_s),  # uvicorn takes whole seconds
         log_config=None,
         access_log=False,  # the application has its own
+        proxy_headers=bool(settings.trusted_proxies),
+        forwarded_allow_ips=list(settings.trusted_proxies),
     )
     usual_s = 0.0 if is_loopback(host) else _NOTICE_S
     delay_s = usual_s if settings.drain_delay_s is None else settings.drain_delay_s

@@ -2,7 +2,6 @@
 
 import gzip
 import re
-import shutil
 import zlib
 from collections.abc import AsyncIterator
 from email.message import EmailMessage
@@ -10,12 +9,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from anyio import to_thread
-from starlette.datastructures import UploadFile
 from starlette.requests import Request
 
-from app.errors import problem
+from app.errors import problem, too_large_unpacked
+from app.http.form_file import FormFile
 from app.schemas.meshes import LONGEST_NAME
-from app.settings import variable_of
+from app.store.scratch import ScratchFolder, most_unpacked
 
 _FORMAT_OF_TYPE = {
     "application/json": "json",
@@ -31,6 +30,8 @@ _FORMAT_OF_TYPE = {
     "model/gltf+json": "gltf",
     "model/vtk": "vtk",
 }
+_PACKED = (b"\x1f\x8b", b"BZh", b"\xfd7zXZ\0", b"PK\x03\x04")
+"""What files begin with that gzip, bzip2, xz or zip have packed"""
 _BLOCK = 2**20
 _ENDING = re.compile(r"(?:\.[A-Za-z0-9]{1,10}){1,2}$")
 """Up to two suffixes, as .gii.gz has; others are not for file names"""
@@ -47,7 +48,9 @@ class Upload(NamedTuple):
     name: str | None
 
 
-async def spool(request: Request, folder: Path, file_format: str | None, max_bytes: int) -> Upload:
+async def spool(
+    request: Request, folder: ScratchFolder, file_format: str | None, max_bytes: int
+) -> Upload:
     """Write the mesh file of a request into a folder.
 
     Parameters
@@ -61,7 +64,7 @@ async def spool(request: Request, folder: Path, file_format: str | None, max_byt
     max_bytes
         Largest size of a body that comes compressed, once it is not.
     """
-    path = folder / "upload"
+    path = folder.path / "upload"
     media_type = _media_type(request.headers.get("content-type"))
     coding = request.headers.get("content-encoding", "identity").strip().lower()
     is_form = media_type == "multipart/form-data"
@@ -70,13 +73,17 @@ async def spool(request: Request, folder: Path, file_format: str | None, max_byt
         hint = "send the file uncompressed, or compressed with gzip"
         headers = {"Accept-Encoding": "gzip, identity"}
         raise problem("unsupported_media_type", detail, hint=hint, headers=headers)
+    declared = int(request.headers.get("content-length", "0"))
+    folder.reserve(min(declared, max_bytes))
     if is_form:
-        media_type, name = await _spool_form(request, path)
+        form = FormFile(request.headers["content-type"])
+        await _write(path, form.content(request.stream()), folder)
+        media_type, name = _media_type(form.content_type), form.name
     else:
-        await _write(path, request.stream())
+        await _write(path, request.stream(), folder)
         name = _named_in(request.headers.get("content-disposition"))
     if coding == "gzip":
-        await _decompress(path, max_bytes)
+        await _decompress(path, max_bytes, folder)
     if path.stat().st_size == 0:
         raise problem("invalid_mesh", "the body is empty: there is no mesh in it")
     name = _CONTROL.sub("", Path(name).name)
@@ -94,43 +101,44 @@ def _named_in(disposition: str | None) -> str:
     return message.get_filename("")
 
 
-async def _spool_form(request: Request, path: Path) -> tuple[str, str]:
-    """Write the file of a form; return its media type and its name."""
-    async with request.form(max_files=1, max_fields=0) as form:
-        file = next((part for part in form.values() if isinstance(part, UploadFile)), None)
-        if file is None:
-            raise problem("malformed_body", "the form has no file")
-        with path.open("wb") as target:
-            await to_thread.run_sync(shutil.copyfileobj, file.file, target, _BLOCK)
-        return _media_type(file.content_type), file.filename or ""
-
-
-async def _write(path: Path, chunks: AsyncIterator[bytes]) -> None:
+async def _write(path: Path, chunks: AsyncIterator[bytes], folder: ScratchFolder) -> None:
     # In large blocks: a hop to a thread costs as much as writing a hundred kilobytes.
     block = bytearray()
     with path.open("wb") as file:
+
+        async def write_block() -> None:
+            folder.reserve(max(folder.reserved, file.tell() + len(block)))
+            await to_thread.run_sync(file.write, bytes(block))
+            block.clear()
+
         async for chunk in chunks:
             block += chunk
             if len(block) >= _BLOCK:
-                await to_thread.run_sync(file.write, bytes(block))
-                block.clear()
-        await to_thread.run_sync(file.write, bytes(block))
+                await write_block()
+        await write_block()
 
 
-async def _decompress(path: Path, max_bytes: int) -> None:
+async def _decompress(path: Path, max_bytes: int, folder: ScratchFolder) -> None:
     """Replace a file by its content, which gzip has compressed."""
     compressed = path.rename(path.with_name("compressed"))
+    size = compressed.stat().st_size
+    limit = most_unpacked(size, max_bytes)
+    folder.reserve(size + limit)
     try:
         with gzip.open(compressed) as source, path.open("wb") as target:
             while block := await to_thread.run_sync(source.read, _BLOCK):
-                if target.tell() + len(block) > max_bytes:
-                    detail = f"the body is larger than {max_bytes} bytes after decompression"
-                    setting = variable_of("max_upload_bytes")
-                    raise problem("upload_too_large", detail, limit=max_bytes, setting=setting)
+                if target.tell() + len(block) > limit:
+                    raise too_large_unpacked(limit, max_bytes)
                 await to_thread.run_sync(target.write, block)
     except (gzip.BadGzipFile, EOFError, zlib.error) as error:
         raise problem("malformed_body", f"the body is not valid gzip data: {error}") from error
+    with path.open("rb") as source:
+        if source.read(6).startswith(_PACKED):  # the ratios would multiply
+            detail = "the file is packed, and so is the body"
+            hint = "send a packed file without Content-Encoding"
+            raise problem("unsupported_media_type", detail, hint=hint)
     compressed.unlink()
+    folder.reserve(path.stat().st_size)
 
 
 def _media_type(header: str | None) -> str:

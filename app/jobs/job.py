@@ -66,6 +66,11 @@ class Job(BaseModel):
     """Name of the answer in the result store"""
 
     @property
+    def owner(self) -> str | None:
+        """The owner, as of an `EndedJob`."""
+        return self.spec.owner
+
+    @property
     def is_finished(self) -> bool:
         """Whether this is the last state."""
         return self.finished is not None

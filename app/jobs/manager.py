@@ -24,7 +24,6 @@ from app.jobs.job import Job, JobSpec
 from app.jobs.repository import JobRecords, JobRepository
 from app.jobs.retention import FinishedJob, Retention
 from app.repeating import repeat
-from app.settings import variable_of
 from app.state import Replicas
 from app.state.replicas import BEAT_S
 from app.store.results import Result, ResultStore
@@ -56,12 +55,6 @@ _STOPPED_TOO_OFTEN = Problem(
 )
 _SIGNS_OF_THE_END = frozenset({"draining", "engine_unavailable", "worker_died"})
 """Problems of jobs that the end of the service interrupts: a signal may have gone to workers too"""
-_NO_ROOM = Problem(
-    "storage_full",
-    "the answers of other jobs leave no room for this one",
-    setting=variable_of("results_bytes"),
-    hint="delete jobs whose answers you have read",
-)
 
 
 class _LiveJob:
@@ -251,8 +244,8 @@ class JobManager:
         jobs = [live.job for live in self._live.values()]
         return finished + Counter(job.status for job in jobs if not job.is_finished)
 
-    async def dismiss(self, owner: str | None, job_id: str) -> Job:
-        """Stop a job, or remove it where it has finished; return its last state."""
+    async def cancel(self, owner: str | None, job_id: str) -> Job:
+        """Stop a job, and return its last state; one that has finished stays as it is."""
         job = await self.find(owner, job_id)
         live = self._live.get(job_id)
         if live is not None and not live.job.is_finished:
@@ -265,9 +258,14 @@ class JobManager:
             if await self._repository.update(dismissed, job.replica):
                 self._retention.add(dismissed)
                 return dismissed
-            return await self.dismiss(owner, job_id)  # it has finished, or has been taken over
-        await self._remove(job)
+            return await self.cancel(owner, job_id)  # it has finished, or has been taken over
         return job
+
+    async def remove(self, owner: str | None, job_id: str) -> Job:
+        """Remove a job with its answer, and return its last state; one that runs is stopped."""
+        last = await self.cancel(owner, job_id)
+        await self._remove(last)
+        return last
 
     async def result(self, owner: str | None, job_id: str) -> tuple[Job, Result]:
         """Acquire the answer of a job.
@@ -428,7 +426,7 @@ class JobManager:
             if not self._knows(job.id):
                 self._retention.add_older(job)
                 if job.result is not None:
-                    self._results.pin(job.result)
+                    self._results.pin(job.result, job.owner)
 
     def _knows(self, job_id: str) -> bool:
         return job_id in self._retention or job_id in self._live
@@ -460,11 +458,11 @@ class JobManager:
                 logger.exception("job failed", job_id=live.job.id)
             await self._end(live, live.job.failed(problem))
             return
-        if self._results.can_pin(result.name):
-            self._results.pin(result.name)
+        try:
+            self._results.pin_within_quota(result.name, live.job.spec.owner)
             last = live.job.successful(result.name)
-        else:
-            last = live.job.failed(_NO_ROOM)
+        except ProblemError as error:
+            last = live.job.failed(error.problem)
         self._results.release(result)
         await self._end(live, last)
 
@@ -508,10 +506,10 @@ class JobManager:
         if record is not None and (record.version, record.replica) == (last.version, last.replica):
             return  # recorded before, although the database could not say so
         if last.result is not None:
-            self._results.unpin(last.result)
+            self._results.unpin(last.result, last.spec.owner)
         live.update(record or last.dismissed())
         if record is not None and record.result is not None:
-            self._results.pin(record.result)
+            self._results.pin(record.result, record.spec.owner)
 
     async def _record_ends(self) -> None:
         """Record the ends of jobs that could not be recorded when they came."""
@@ -532,4 +530,4 @@ class JobManager:
         was_live = self._live.pop(job.id, None) is not None
         was_retained = self._retention.discard(job.id)
         if job.result is not None and (was_live or was_retained):
-            self._results.unpin(job.result)
+            self._results.unpin(job.result, job.owner)

@@ -17,7 +17,6 @@ from app.queries.base import (
 )
 from app.queries.borders import BordersQuery
 from app.queries.distances import DistancesQuery
-from app.queries.estimate import Estimate, estimate
 from app.queries.field_cache import FieldCache, Unwritten
 from app.queries.isolines import IsolinesQuery
 from app.queries.locate import LocateQuery
@@ -25,6 +24,7 @@ from app.queries.matrix import MatrixQuery
 from app.queries.nearest import NearestQuery
 from app.queries.path import PathQuery, naming_parameters, written_request
 from app.queries.paths import PathsQuery
+from app.queries.steps import StepsQuery
 from app.queries.validation import MeshSize, check_lengths
 
 KINDS: Mapping[str, type[Query[Any]]] = {
@@ -32,6 +32,7 @@ KINDS: Mapping[str, type[Query[Any]]] = {
     for kind in (
         DistancesQuery,
         PathQuery,
+        StepsQuery,
         PathsQuery,
         IsolinesQuery,
         BordersQuery,
@@ -47,7 +48,6 @@ __all__ = [
     "SMALL_SECONDS",
     "BordersQuery",
     "DistancesQuery",
-    "Estimate",
     "ExecutionContext",
     "FieldCache",
     "IsolinesQuery",
@@ -58,10 +58,10 @@ __all__ = [
     "PathQuery",
     "PathsQuery",
     "Query",
+    "StepsQuery",
     "Unwritten",
     "check_lengths",
     "code_version",
-    "estimate",
     "fingerprint",
     "naming_parameters",
     "result_key",

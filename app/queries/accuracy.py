@@ -115,11 +115,6 @@ def _as_source(point: StrictModel) -> dict[str, Any]:
 # Members of answers
 
 
-def method_of(request: Accuracy) -> dict[str, Any]:
-    """Return the members that state the method."""
-    return {"method": request.method, "exact": request.method == "exact"}
-
-
 def bound_of(bound: gc.ErrorBound) -> Mapping[str, Any]:
     """Return the members of an error bound."""
     return {"type": bound.type, "value": bound.value, "kind": bound.kind}
@@ -133,11 +128,3 @@ def bound_on(mesh: gc.TriangleMesh, request: Accuracy) -> Mapping[str, Any]:
 def stats_of(stats: gc.SweepStats) -> Mapping[str, Any]:
     """Return the statistics that are the same in every run; seconds are in `Server-Timing`."""
     return {name: value for name, value in stats.as_dict().items() if name != "seconds"}
-
-
-def expected_stats(mesh: gc.TriangleMesh, share: float) -> Mapping[str, Any]:
-    """Return statistics of about as many digits, for a sweep over a share of the mesh."""
-    faces = int(share * len(mesh.faces)) + 1
-    windows = round(faces**1.5)
-    per_edge = windows / mesh.edge_count
-    return stats_of(gc.SweepStats(windows, windows, faces, per_edge, per_edge, 100 * faces, 0.0))

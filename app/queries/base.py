@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import Any, ClassVar, Generic, Self, TypeVar
-from uuid import uuid4
 
 import numpy as np
 import orjson
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 import geodesic_core as gc
 from app import __version__
 from app.encoding import JSON, NPY, OCTETS, Answer, Representation
-from app.queries.cost_model import PER_FACE_BLOCKED, Cost
+from app.queries.cost_model import PER_FACE_BLOCKED
 from app.queries.field_cache import FieldCache
 from app.queries.points import SurfacePoints, name_of, notes_on, resolve_points
 from app.queries.validation import (
@@ -35,11 +34,16 @@ from app.store.meshes import OpenMesh
 VALUES_OF_POINT = 8
 """Values of a point in JSON: position, distance, and a face with three weights."""
 
+BYTES_OF_VALUE = 8
+"""Bytes of a value of an answer, about: in binary, and in text that is compressed."""
+
 SMALL_SECONDS = 0.05
 """Seconds of work below which a query is small: it need not wait behind long work."""
 
 UNLIMITED = 2**63
 """A limit that no answer reaches."""
+
+_UNKNOWN, _AS_JSON = MeshSize(0, 0, 0.0), Representation(JSON)
 
 R = TypeVar("R", bound=StrictModel)
 
@@ -74,17 +78,6 @@ class ExecutionContext:
 
 
 @dataclass(frozen=True)
-class Forecast:
-    """The expected cost of an answer, and its expected size."""
-
-    cost: Cost
-    answer: Answer
-    """An answer of about the same size, mostly of straight distances instead of geodesic ones"""
-    times: float = 1.0
-    """The size of the real answer, as a multiple of that"""
-
-
-@dataclass(frozen=True)
 class Query(ABC, Generic[R]):
     """A request to a mesh: one subclass for each kind.
 
@@ -95,6 +88,10 @@ class Query(ABC, Generic[R]):
     mesh_id: str
     request: R
     """Normalized: requests that mean the same are equal"""
+    size: MeshSize = _UNKNOWN
+    """The size of the mesh, for limits and costs; workers, which have the mesh, do not need it"""
+    representation: Representation = _AS_JSON
+    """The form of the answer"""
 
     kind: ClassVar[str]
     """The name of the kind for clients"""
@@ -115,9 +112,9 @@ class Query(ABC, Generic[R]):
         if isinstance(request, AmongBarriers):
             check_barriers(request.barriers, size)
             request = request.model_copy(update={"barriers": sorted(set(request.barriers))})
-        query = cls(mesh_id, cls.normalized(request))
+        query = cls(mesh_id, cls.normalized(request), size)
         if settings is not None:
-            query.check_limits(size, settings)
+            query.check_limits(settings)
         check_points(query.written_points(), size)
         return query
 
@@ -127,7 +124,11 @@ class Query(ABC, Generic[R]):
         For 40 000 points that takes 5 ms here and 0.1 s there, where models, pickled one by one,
         took 0.2 and 0.5 s.
         """
-        return _revived, (type(self), self.mesh_id, self.written)
+        return _revived, (type(self), self.mesh_id, self.written, self.representation)
+
+    def answered_as(self, representation: Representation) -> Self:
+        """Return the same query, with its answer in a representation."""
+        return replace(self, representation=representation)
 
     @cached_property
     def written(self) -> bytes:
@@ -149,11 +150,6 @@ class Query(ABC, Generic[R]):
     # What each kind defines
 
     @property
-    def is_repeatable(self) -> bool:
-        """Whether the answer is the same in every run."""
-        return True
-
-    @property
     def offers(self) -> Sequence[str]:
         """The media types of the answer."""
         return JSON, NPY, OCTETS
@@ -168,52 +164,46 @@ class Query(ABC, Generic[R]):
         """Return the request in its one spelling, or refuse members that contradict each other."""
         return request
 
-    def check_limits(self, size: MeshSize, settings: Settings) -> None:
+    def check_limits(self, settings: Settings) -> None:
         """Refuse a request that exceeds the limits of the service."""
 
     def check_format(self, media_type: str) -> None:
         """Refuse a request that one of the ``offers`` has no room for."""
 
-    def value_count(self, size: MeshSize) -> int:
+    def value_count(self) -> int:
         """Return the number of values of the answer in JSON; 0 where only solving yields it."""
         return 0
+
+    def rough_bytes(self) -> int:
+        """Return the bytes of the answer, about, as far as they are known before."""
+        return BYTES_OF_VALUE * self.value_count()
 
     def written_points(self) -> WrittenPoints:
         """Yield the points of the request, in the order that `solve` takes them."""
         return iter(())
 
     @abstractmethod
-    def rough_seconds(self, size: MeshSize) -> float:
+    def rough_seconds(self) -> float:
         """Return the expected seconds of `solve`, by the size of the mesh alone."""
 
     @abstractmethod
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Compute the answer on an open mesh, for the resolved points."""
 
-    @abstractmethod
-    def forecast(self, opened: OpenMesh, points: SurfacePoints) -> Forecast:
-        """Return the expected cost of `solve`, without solving."""
-
     # What all kinds share
 
-    def is_small(self, size: MeshSize) -> bool:
-        """Tell whether the answer takes less than `SMALL_SECONDS`, about."""
-        blocked = PER_FACE_BLOCKED * size.faces if len(self.barriers) else 0.0
-        return self.rough_seconds(size) + blocked < SMALL_SECONDS
+    @property
+    def is_small(self) -> bool:
+        """Whether the answer takes less than `SMALL_SECONDS`, about."""
+        blocked = PER_FACE_BLOCKED * self.size.faces if len(self.barriers) else 0.0
+        return self.rough_seconds() + blocked < SMALL_SECONDS
 
-    def check_answer(
-        self,
-        representation: Representation,
-        size: MeshSize,
-        settings: Settings,
-        *,
-        as_job: bool,
-    ) -> None:
+    def check_answer(self, settings: Settings, *, as_job: bool) -> None:
         """Refuse a format that has no room for the answer, as far as that is known before."""
-        if representation.media_type == JSON:
-            check_json_size(self.value_count(size), settings.max_json_values, self.hint)
+        if self.representation.media_type == JSON:
+            check_json_size(self.value_count(), settings.max_json_values, self.hint)
         else:
-            self.check_format(representation.media_type)
+            self.check_format(self.representation.media_type)
 
     def with_barriers(self, opened: OpenMesh) -> OpenMesh:
         """Return a mesh with the ``barriers``, or refuse those that leave nothing of it."""
@@ -247,8 +237,11 @@ class Query(ABC, Generic[R]):
         return resolve_points(self.written_points(), mesh, cancel)
 
 
-def _revived(kind: type[Query[Any]], mesh_id: str, request: bytes) -> Query[Any]:
-    return kind(mesh_id, kind.model.model_validate_json(request))
+def _revived(
+    kind: type[Query[Any]], mesh_id: str, request: bytes, representation: Representation
+) -> Query[Any]:
+    read = kind.model.model_validate_json(request)
+    return kind(mesh_id, read, representation=representation)
 
 
 @cache
@@ -257,22 +250,21 @@ def code_version() -> str:
     return f"{__version__}+{gc.kernel_digest()}"
 
 
-def result_key(query: Query[Any], representation: Representation) -> str:
-    """Return the name of the answer to ``query`` in a representation.
+def result_key(query: Query[Any]) -> str:
+    """Return the name of the answer to a query.
 
-    It is a hash, of the code that answers as well, unless the answer differs from run to run: then
-    each run has a name of its own.
+    It is a hash, of the code that answers as well.
     """
-    return _hash(query, representation, code_version()) if query.is_repeatable else uuid4().hex
+    return _hash(query, code_version())
 
 
-def fingerprint(query: Query[Any], representation: Representation) -> str:
-    """Return the hash of ``query`` in a representation, the same in all releases."""
-    return _hash(query, representation)
+def fingerprint(query: Query[Any]) -> str:
+    """Return the hash of a query and the form of its answer, the same in all releases."""
+    return _hash(query)
 
 
-def _hash(query: Query[Any], representation: Representation, *more: str) -> str:
-    names = [type(query).__name__, query.mesh_id, representation, *more]
+def _hash(query: Query[Any], *more: str) -> str:
+    names = [type(query).__name__, query.mesh_id, query.representation, *more]
     digest = hashlib.blake2b(orjson.dumps(names), digest_size=16)
     digest.update(query.written)
     return digest.hexdigest()

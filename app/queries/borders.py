@@ -4,31 +4,22 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 import geodesic_core as gc
 from app.encoding import Answer
-from app.queries.accuracy import affinity_keys_of, expected_stats, solve_field, stats_of
-from app.queries.base import ExecutionContext, Forecast, Query
+from app.queries.accuracy import affinity_keys_of, solve_field, stats_of
+from app.queries.base import ExecutionContext, Query
 from app.queries.cost_model import (
     FACES_ON_LEVEL,
     PER_FACE_DIVIDED,
-    PER_POINT,
     PER_WINDOW_DIVIDED,
-    SEGMENTS_IN_FACE,
-    Cost,
-    rough_share,
     share_reached,
-    straight_to_nearest,
-    sweep_cost,
+    sweep_seconds,
 )
 from app.queries.lines import (
     OFFERS,
     VALUES_OF_LINE_POINT,
     describe_line,
     resolved_chord_error,
-    straight_line,
 )
 from app.queries.points import (
     SurfacePoints,
@@ -38,7 +29,6 @@ from app.queries.points import (
     to_sources,
 )
 from app.queries.validation import (
-    MeshSize,
     WrittenPoints,
     check_count,
     check_json_size,
@@ -59,7 +49,7 @@ class BordersQuery(Query[BordersRequest]):
     offers = OFFERS
     hint = "set a larger chord_error, or a max_distance"
 
-    def check_limits(self, size: MeshSize, settings: Settings) -> None:
+    def check_limits(self, settings: Settings) -> None:
         """Refuse too many sources."""
         check_count("sources", point_count(*self.request.sources), settings, "max_sources")
 
@@ -72,15 +62,17 @@ class BordersQuery(Query[BordersRequest]):
         """Yield the sources."""
         return points_in_sources(self.request.sources)
 
-    def rough_seconds(self, size: MeshSize) -> float:
+    def rough_seconds(self) -> float:
         """Return the cost of two sweeps to the limit, and of the lines."""
         request = self.request
-        share = rough_share(size, point_count(*request.sources), request.max_distance)
+        share = share_reached(self.size, point_count(*request.sources), request.max_distance)
         lines = math.sqrt(len(request.sources) - 1)  # as the length of all borders grows
-        crossed = min(1.0, lines * FACES_ON_LEVEL / math.sqrt(size.faces)) * share
-        sweep = sweep_cost(size.faces, EXACT, share, crossed=crossed)
-        each = _seconds_per_face(share * size.faces, len(request.sources))
-        return sweep.seconds + each * crossed * size.faces
+        crossed = min(1.0, lines * FACES_ON_LEVEL / math.sqrt(self.size.faces)) * share
+        sweep = sweep_seconds(self.size.faces, EXACT, share, crossed=crossed)
+        # The windows over an edge grow with the distance to its source.
+        windows = math.sqrt(share * self.size.faces / len(request.sources))
+        each = PER_FACE_DIVIDED + PER_WINDOW_DIVIDED * windows
+        return sweep + each * crossed * self.size.faces
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep, then draw the borders, if they fit into the answer."""
@@ -95,21 +87,6 @@ class BordersQuery(Query[BordersRequest]):
         check_json_size(values, context.max_values, self.hint)
         found = [describe_border(border) for border in borders]
         return self._answer(opened, starts, chord_error, found, stats_of(field.stats))
-
-    def forecast(self, opened: OpenMesh, points: SurfacePoints) -> Forecast:
-        """Return the cost of two sweeps and of the lines, if geodesics were straight."""
-        request, mesh = self.request, opened.mesh
-        chord_error = resolved_chord_error(mesh, request.chord_error)
-        starts = to_sources(mesh, request.sources, points)
-        share = share_reached(mesh, len(points), request.max_distance)
-        straight, nearest = straight_to_nearest(mesh, points, None, request.max_distance)
-        faces = _divided_faces(mesh, straight, nearest) if len(starts) > 1 else np.empty(0, int)
-        found = [{"sources": (0, 1), **straight_line(mesh, faces, 1.0)}] if len(faces) else []
-        sweep = sweep_cost(len(mesh.faces), EXACT, share, crossed=len(faces) / len(mesh.faces))
-        seconds = sweep.seconds + PER_POINT * len(points)
-        seconds += _seconds_per_face(share * len(mesh.faces), len(starts)) * len(faces)
-        answer = self._answer(opened, starts, chord_error, found, expected_stats(mesh, share))
-        return Forecast(Cost(seconds, sweep.memory_bytes), answer, SEGMENTS_IN_FACE)
 
     def _answer(
         self,
@@ -145,12 +122,3 @@ def _seconds_per_face(faces: float, sources: int) -> float:
     The windows over an edge grow with the distance to its source.
     """
     return PER_FACE_DIVIDED + PER_WINDOW_DIVIDED * math.sqrt(faces / sources)
-
-
-def _divided_faces(
-    mesh: gc.TriangleMesh, distances: NDArray[np.float64], nearest: NDArray[np.int64]
-) -> NDArray[np.int64]:
-    """Return the faces whose corners are nearest to different points."""
-    corners = nearest[mesh.faces]
-    differ = (corners != corners[:, :1]).any(axis=1)
-    return np.flatnonzero(differ & np.isfinite(distances[mesh.faces]).all(axis=1))

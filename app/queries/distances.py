@@ -12,24 +12,13 @@ from app.encoding import CSV, JSON, NPY, OCTETS, PLY, Answer, Indices
 from app.errors import Fault, problem
 from app.queries.accuracy import (
     affinity_keys_of,
-    as_swept,
     bound_of,
-    bound_on,
-    expected_stats,
-    method_of,
     solve_field,
     stats_of,
     with_default_accuracy,
 )
-from app.queries.base import VALUES_OF_POINT, ExecutionContext, Forecast, Query
-from app.queries.cost_model import (
-    PER_POINT,
-    Cost,
-    rough_share,
-    share_reached,
-    straight_to_nearest,
-    sweep_cost,
-)
+from app.queries.base import VALUES_OF_POINT, ExecutionContext, Query
+from app.queries.cost_model import PER_POINT, share_reached, sweep_seconds
 from app.queries.points import (
     SurfacePoints,
     components_of,
@@ -39,10 +28,9 @@ from app.queries.points import (
     numbered,
     point_count,
     points_in_sources,
-    positions_of,
     to_sources,
 )
-from app.queries.validation import MeshSize, WrittenPoints, check_count, invalid_fields
+from app.queries.validation import WrittenPoints, check_count, invalid_fields
 from app.queries.views import columns_of, surface_of, table_of_distances
 from app.schemas.requests import DistancesRequest
 from app.settings import Settings
@@ -67,7 +55,7 @@ class DistancesQuery(Query[DistancesRequest]):
         included = list(dict.fromkeys(request.include))
         return with_default_accuracy(request.model_copy(update={"include": included}))
 
-    def check_limits(self, size: MeshSize, settings: Settings) -> None:
+    def check_limits(self, settings: Settings) -> None:
         """Refuse too many sources."""
         check_count("sources", point_count(*self.request.sources), settings, "max_sources")
 
@@ -83,11 +71,11 @@ class DistancesQuery(Query[DistancesRequest]):
         if faults and media_type in (NPY, OCTETS):
             raise problem("invalid_request", f"{media_type} holds one array", errors=tuple(faults))
 
-    def value_count(self, size: MeshSize) -> int:
+    def value_count(self) -> int:
         """Return the number of distances, and of the values that are included with each."""
         columns = 1 + sum(_VALUES_INCLUDED[name] for name in self._included)
         if self.request.targets is None:
-            return columns * size.vertices
+            return columns * self.size.vertices
         return (columns + VALUES_OF_POINT) * len(self.request.targets)
 
     @property
@@ -102,13 +90,13 @@ class DistancesQuery(Query[DistancesRequest]):
             points_in_sources(request.sources), numbered("/targets", request.targets or ())
         )
 
-    def rough_seconds(self, size: MeshSize) -> float:
+    def rough_seconds(self) -> float:
         """Return the cost of a sweep to the limit."""
         request = self.request
-        share = rough_share(size, point_count(*request.sources), request.max_distance)
-        paths = "gradient" in self._included
-        points = point_count(*request.sources) + len(request.targets or ())
-        return sweep_cost(size.faces, request, share, paths=paths).seconds + PER_POINT * points
+        sources = point_count(*request.sources)
+        share = share_reached(self.size, sources, request.max_distance)
+        points = sources + len(request.targets or ())
+        return sweep_seconds(self.size.faces, request, share) + PER_POINT * points
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep once."""
@@ -132,28 +120,6 @@ class DistancesQuery(Query[DistancesRequest]):
             included["gradient"] = field.gradient
         bound, stats = bound_of(field.error_bound), stats_of(field.stats)
         return self._answer(opened, points, starts, distances, included, bound, stats)
-
-    def forecast(self, opened: OpenMesh, points: SurfacePoints) -> Forecast:
-        """Return the cost of one sweep, and an answer of straight distances."""
-        request, mesh = self.request, opened.mesh
-        sources, targets = self._parted(points)
-        starts = to_sources(mesh, request.sources, sources)
-        share = share_reached(mesh, len(sources), request.max_distance)
-        swept = as_swept(request, mesh)
-        sweep = sweep_cost(len(mesh.faces), swept, share, paths="gradient" in self._included)
-        straight, nearest = straight_to_nearest(mesh, sources, targets, request.max_distance)
-        cost = Cost(sweep.seconds + PER_POINT * len(points), sweep.memory_bytes)
-        bound = bound_on(mesh, request)
-        included: dict[str, NDArray[Any]] = {}
-        if "nearest_source" in self._included:
-            included["nearest_source"] = nearest
-        if "gradient" in self._included:
-            ahead = mesh.vertices - positions_of(mesh, sources)[nearest]
-            included["gradient"] = _straight_gradient(ahead, straight)
-        stats = expected_stats(mesh, share)
-        return Forecast(
-            cost, self._answer(opened, points, starts, straight, included, bound, stats)
-        )
 
     @property
     def _included(self) -> Sequence[str]:
@@ -179,7 +145,7 @@ class DistancesQuery(Query[DistancesRequest]):
         members: dict[str, Any] = {
             "kind": self.kind,
             "mesh_id": self.mesh_id,
-            **method_of(self.request),
+            "method": self.request.method,
             "error_bound": error_bound,
             "sources": [describe_source(mesh, start) for start in starts],
         }
@@ -201,16 +167,6 @@ class DistancesQuery(Query[DistancesRequest]):
             table=table_of_distances("vertex" if targets is None else "target", columns),
             surface=surface_of(mesh, columns) if targets is None else None,
         )
-
-
-def _straight_gradient(
-    ahead: NDArray[np.float64], straight: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return the directions of vectors (V, 3); NaN at sources and where unreachable."""
-    length = np.linalg.norm(ahead, axis=1)
-    length[~np.isfinite(straight) | (length == 0.0)] = np.nan
-    ahead /= length[:, None]
-    return ahead
 
 
 def _at(

@@ -11,36 +11,18 @@ import geodesic_core as gc
 from app.encoding import Answer
 from app.queries.accuracy import (
     affinity_keys_of,
-    as_swept,
     bound_of,
-    bound_on,
-    expected_stats,
-    method_of,
     solve_field,
     stats_of,
     with_default_accuracy,
 )
-from app.queries.base import ExecutionContext, Forecast, Query
-from app.queries.cost_model import (
-    ARC_IN_FACE,
-    FACES_ON_LEVEL,
-    PER_FACE_CROSSED,
-    PER_POINT,
-    PER_WINDOW_CROSSED,
-    SEGMENTS_IN_FACE,
-    Cost,
-    rough_share,
-    share_reached,
-    straight_to_nearest,
-    sweep_cost,
-    typical_edge,
-)
+from app.queries.base import ExecutionContext, Query
+from app.queries.cost_model import FACES_ON_LEVEL, PER_FACE_CROSSED, share_reached, sweep_seconds
 from app.queries.lines import (
     OFFERS,
     VALUES_OF_LINE_POINT,
     describe_line,
     resolved_chord_error,
-    straight_line,
 )
 from app.queries.points import (
     SurfacePoints,
@@ -50,7 +32,6 @@ from app.queries.points import (
     to_sources,
 )
 from app.queries.validation import (
-    MeshSize,
     WrittenPoints,
     check_count,
     check_json_size,
@@ -82,7 +63,7 @@ class IsolinesQuery(Query[IsolinesRequest]):
             raise invalid_fields(["/count"], "does not go with levels")
         return with_default_accuracy(request)
 
-    def check_limits(self, size: MeshSize, settings: Settings) -> None:
+    def check_limits(self, settings: Settings) -> None:
         """Refuse too many sources or levels."""
         check_count("sources", point_count(*self.request.sources), settings, "max_sources")
         check_count("levels", self._level_count, settings, "max_levels")
@@ -96,13 +77,13 @@ class IsolinesQuery(Query[IsolinesRequest]):
         """Yield the sources."""
         return points_in_sources(self.request.sources)
 
-    def rough_seconds(self, size: MeshSize) -> float:
+    def rough_seconds(self) -> float:
         """Return the cost of a sweep to the limit, and of the lines."""
         request = self.request
-        share = rough_share(size, point_count(*request.sources), request.max_distance)
-        crossed = min(1.0, self._level_count * FACES_ON_LEVEL / math.sqrt(size.faces)) * share
-        sweep = sweep_cost(size.faces, request, share, crossed=crossed)
-        return sweep.seconds + PER_FACE_CROSSED * crossed * size.faces
+        share = share_reached(self.size, point_count(*request.sources), request.max_distance)
+        crossed = min(1.0, self._level_count * FACES_ON_LEVEL / math.sqrt(self.size.faces)) * share
+        sweep = sweep_seconds(self.size.faces, request, share, crossed=crossed)
+        return sweep + PER_FACE_CROSSED * crossed * self.size.faces
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep, then draw level by level, as long as the lines fit into the answer."""
@@ -127,32 +108,6 @@ class IsolinesQuery(Query[IsolinesRequest]):
             found.append(describe_level(level, lines))
         bound, stats = bound_of(field.error_bound), stats_of(field.stats)
         return self._answer(opened, starts, chord_error, found, bound, stats)
-
-    def forecast(self, opened: OpenMesh, points: SurfacePoints) -> Forecast:
-        """Return the cost of a sweep and its lines, if geodesics were straight."""
-        request, mesh = self.request, opened.mesh
-        chord_error = resolved_chord_error(mesh, request.chord_error)
-        starts = to_sources(mesh, request.sources, points)
-        share = share_reached(mesh, len(points), request.max_distance)
-        straight, _ = straight_to_nearest(mesh, points, None, request.max_distance)
-        levels = self._levels(straight)
-        crossed = [_crossed_faces(mesh, straight, level) for level in levels]
-        found = [
-            {"level": level, "lines": [straight_line(mesh, faces, level)] if len(faces) else []}
-            for level, faces in zip(levels, crossed, strict=True)
-        ]
-        counts = np.array([len(faces) for faces in crossed])
-        swept = as_swept(request, mesh)
-        sweep = sweep_cost(len(mesh.faces), swept, share, crossed=counts.sum() / len(mesh.faces))
-        per_face = PER_FACE_CROSSED
-        if swept.method == "exact":
-            per_face += PER_WINDOW_CROSSED * math.sqrt(share * len(mesh.faces))
-        seconds = sweep.seconds + PER_POINT * len(points) + per_face * float(counts.sum())
-        segments = _segments_in_face(mesh, np.array(levels), chord_error)
-        times = float(counts @ segments) / counts.sum() if counts.any() else 1.0
-        bound, stats = bound_on(mesh, request), expected_stats(mesh, share)
-        answer = self._answer(opened, starts, chord_error, found, bound, stats)
-        return Forecast(Cost(seconds, sweep.memory_bytes), answer, times)
 
     @property
     def _level_count(self) -> int:
@@ -183,7 +138,7 @@ class IsolinesQuery(Query[IsolinesRequest]):
             {
                 "kind": self.kind,
                 "mesh_id": self.mesh_id,
-                **method_of(self.request),
+                "method": self.request.method,
                 "error_bound": error_bound,
                 "chord_error": chord_error,
                 "sources": [describe_source(opened.mesh, start) for start in starts],
@@ -199,26 +154,3 @@ class IsolinesQuery(Query[IsolinesRequest]):
 def describe_level(level: float, lines: Sequence[gc.Isoline]) -> dict[str, Any]:
     """Return the members of a level."""
     return {"level": level, "lines": [describe_line(line) for line in lines]}
-
-
-def _crossed_faces(
-    mesh: gc.TriangleMesh, distances: NDArray[np.float64], level: float
-) -> NDArray[np.int32]:
-    """Return the faces with corners on both sides of a level."""
-    inside = distances[mesh.faces] <= level
-    return np.flatnonzero(inside.any(axis=1) & ~inside.all(axis=1)).astype(np.int32)
-
-
-def _segments_in_face(
-    mesh: gc.TriangleMesh, levels: NDArray[np.float64], chord_error: float
-) -> NDArray[np.float64]:
-    """Return the number of segments in which a line of each level crosses a face.
-
-    An arc of radius r turns by its length over r, by a right angle at most, and each chord turns by
-    √(8 c / r), for the error c.
-    """
-    turns = np.minimum(ARC_IN_FACE * typical_edge(mesh) / levels, 0.5 * np.pi)
-    segments: NDArray[np.float64] = np.maximum(
-        turns / np.sqrt(8.0 * chord_error / levels), SEGMENTS_IN_FACE
-    )
-    return segments

@@ -3,13 +3,11 @@
 from collections.abc import Sequence
 from typing import Any
 
-from numpy.typing import NDArray
-
 import geodesic_core as gc
-from app.encoding import CSV, GEOJSON, JSON, OBJ, SVG
+from app.encoding import CSV, JSON, OBJ
 from app.queries.validation import invalid_fields
 
-OFFERS: Sequence[str] = (JSON, OBJ, CSV, SVG, GEOJSON)
+OFFERS: Sequence[str] = JSON, OBJ, CSV
 """Media types that hold lines."""
 VALUES_OF_LINE_POINT = 4
 """Values in JSON of a point of a line: its position, and the face of its segment."""
@@ -31,9 +29,3 @@ def describe_line(line: gc.Isoline | gc.Border) -> dict[str, Any]:
         "points": line.points,
         "faces": line.faces,
     }
-
-
-def straight_line(mesh: gc.TriangleMesh, faces: NDArray[Any], length: float) -> dict[str, Any]:
-    """Return the members of a likely line: a point for each face that it crosses."""
-    points = mesh.vertices[mesh.faces[faces]].mean(axis=1)
-    return {"closed": True, "length": length, "points": points, "faces": faces}

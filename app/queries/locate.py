@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 
 import geodesic_core as gc
-from app.encoding import CSV, GEOJSON, JSON, Answer
+from app.encoding import CSV, JSON, Answer
 from app.errors import Fault
-from app.queries.base import VALUES_OF_POINT, ExecutionContext, Forecast, Query
-from app.queries.cost_model import PER_POSITION, Cost
+from app.queries.base import VALUES_OF_POINT, ExecutionContext, Query
+from app.queries.cost_model import PER_POSITION
 from app.queries.points import SurfacePoints, checkpoint, describe_point
-from app.queries.validation import MeshSize, invalid_points
-from app.queries.views import point_features, table_of_points
+from app.queries.validation import invalid_points
+from app.queries.views import table_of_points
 from app.schemas.requests import LocateRequest
 from app.store.meshes import OpenMesh
 
@@ -22,14 +22,14 @@ class LocateQuery(Query[LocateRequest]):
 
     kind = "locate"
     model = LocateRequest
-    offers: Sequence[str] = (JSON, CSV, GEOJSON)
+    offers: Sequence[str] = (JSON, CSV)
     hint = "ask for fewer points at once"
 
-    def value_count(self, size: MeshSize) -> int:
+    def value_count(self) -> int:
         """Return the number of values of all points."""
         return VALUES_OF_POINT * len(self.request.points)
 
-    def rough_seconds(self, size: MeshSize) -> float:
+    def rough_seconds(self) -> float:
         """Return the cost of locating each position."""
         return PER_POSITION * len(self.request.points)
 
@@ -40,14 +40,6 @@ class LocateQuery(Query[LocateRequest]):
             checkpoint(context.cancel)
             found.append(self._located(opened.mesh, i))
         return self._answer(opened, found)
-
-    def forecast(self, opened: OpenMesh, points: SurfacePoints) -> Forecast:
-        """Return the cost of locating all positions, each like the one farthest out."""
-        positions = self.request.points
-        farthest = max(range(len(positions)), key=lambda i: max(map(abs, positions[i])))
-        found = [self._located(opened.mesh, farthest)] * len(positions)
-        cost = Cost(PER_POSITION * len(positions), 0)
-        return Forecast(cost, self._answer(opened, found))
 
     def _located(self, mesh: gc.TriangleMesh, i: int) -> Mapping[str, Any] | None:
         """Return the point nearest to a position; None where it is beyond the limit."""
@@ -72,5 +64,4 @@ class LocateQuery(Query[LocateRequest]):
             },
             shown=("points",),
             table=table_of_points("point", found),
-            points=lambda: point_features("point", found),
         )

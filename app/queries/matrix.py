@@ -1,54 +1,39 @@
 """Distances from many points to many others."""
 
 import math
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 import geodesic_core as gc
-from app.encoding import CSV, JSON, NPY, NPZ, OCTETS, Answer, Representation
+from app.encoding import CSV, JSON, NPY, NPZ, OCTETS, Answer, Elements
 from app.errors import over_limit
 from app.queries.accuracy import (
-    as_swept,
     bound_on,
-    method_of,
     options_of,
     with_default_accuracy,
 )
-from app.queries.base import VALUES_OF_POINT, ExecutionContext, Forecast, Query
-from app.queries.cost_model import (
-    PER_POINT,
-    SWEPT_FROM,
-    Cost,
-    rough_share,
-    search_cost,
-    share_within,
-    straight_along,
-    straight_between,
-    sweep_cost,
-    sweeps_cost,
-)
+from app.queries.base import VALUES_OF_POINT, ExecutionContext, Query
+from app.queries.cost_model import PER_POINT, share_reached, sweep_seconds
 from app.queries.points import SurfacePoints, components_of, describe_point, numbered
-from app.queries.validation import MeshSize, WrittenPoints, check_count, invalid_fields
+from app.queries.validation import WrittenPoints, check_count, invalid_fields
 from app.queries.views import table_of_matrix, table_of_sparse
 from app.schemas.requests import Layout, MatrixRequest
-from app.settings import Settings, available_cores
+from app.settings import Settings
 from app.store.meshes import OpenMesh
 
 if TYPE_CHECKING:
-    from scipy.sparse import coo_array
+    pass
 
 _CELLS = "cells of the matrix"
 _IN_PARTS: Mapping[Layout, str] = {"dense": NPY, "sparse": NPZ}
 """Media types in which jobs compute a matrix of any size, by layout"""
 _INDEX_BYTES = 8
 """Bytes of an index in a sparse file: of the column of a distance, or of the end of a row"""
-_SAMPLED = 2**22
-"""Straight distances that are computed for an estimate, at most, about"""
 
 
 class MatrixQuery(Query[MatrixRequest]):
@@ -88,75 +73,66 @@ class MatrixQuery(Query[MatrixRequest]):
             return "ask for application/x-npz, with `Accept` or with ?format=npz"
         return super().hint
 
-    def check_answer(
-        self,
-        representation: Representation,
-        size: MeshSize,
-        settings: Settings,
-        *,
-        as_job: bool,
-    ) -> None:
+    def check_answer(self, settings: Settings, *, as_job: bool) -> None:
         """Refuse a matrix that is too large for the memory of a worker, or as a job for the store.
 
         The parts and the file are there at the same time.
         """
-        if self.is_in_parts(representation, size, settings, as_job=as_job):
-            needed = self.bytes_in_parts(representation, size)
+        if self.is_in_parts(settings, as_job=as_job):
+            needed = self.bytes_in_parts()
             if needed > settings.results_bytes:
                 what, limit = "bytes of the matrix and its parts", settings.results_bytes
                 raise over_limit("limit_exceeded", what, needed, limit, "results_bytes")
         else:
-            self._check_in_memory(size, settings)
-        super().check_answer(representation, size, settings, as_job=as_job)
+            self._check_in_memory(settings)
+        super().check_answer(settings, as_job=as_job)
 
-    def is_in_parts(
-        self, representation: Representation, size: MeshSize, settings: Settings, *, as_job: bool
-    ) -> bool:
+    def is_in_parts(self, settings: Settings, *, as_job: bool) -> bool:
         """Tell whether the answer is computed in parts, since it may be too large for memory."""
-        if not as_job or representation.media_type != _IN_PARTS.get(self.request.layout):
+        if not as_job or self.representation.media_type != _IN_PARTS.get(self.request.layout):
             return False
-        sources, targets = self._count(size)
+        sources, targets = self._count()
         return sources > settings.max_sources or sources * targets > settings.max_matrix_cells
 
-    def areas_of_parts(self, size: MeshSize) -> list[int]:
+    def areas_of_parts(self) -> list[int]:
         """Return the number of distances in each part."""
-        sources, targets = self._count(size)
+        sources, targets = self._count()
         return gc.MatrixParts.areas(
             sources,
             None if self._is_symmetric else targets,
-            size.faces,
+            self.size.faces,
             self.request.max_distance,
         )
 
-    def bytes_in_parts(self, representation: Representation, size: MeshSize) -> int:
+    def bytes_in_parts(self) -> int:
         """Return the size of the parts and of the file that they become.
 
         Of a sparse matrix these are only the ends of rows: `bytes_of_part` tells the rest.
         """
         if self.request.layout == "sparse":
-            return _INDEX_BYTES * self._count(size)[0]
-        cells = sum(self.areas_of_parts(size)) + math.prod(self._count(size))
-        return cells * np.dtype(representation.dtype).itemsize
+            return _INDEX_BYTES * self._count()[0]
+        cells = sum(self.areas_of_parts()) + math.prod(self._count())
+        return cells * np.dtype(self.representation.dtype).itemsize
 
-    def bytes_of_part(self, representation: Representation, nbytes: int, reached: int) -> int:
+    def bytes_of_part(self, nbytes: int, reached: int) -> int:
         """Return what a part of ``nbytes`` adds to `bytes_in_parts`, once it is computed."""
         if self.request.layout == "dense":
             return 0
-        return nbytes + reached * (_INDEX_BYTES + np.dtype(representation.dtype).itemsize)
+        return nbytes + reached * (_INDEX_BYTES + np.dtype(self.representation.dtype).itemsize)
 
-    def parts(self, opened: OpenMesh, dtype: Any, cancel: Callable[[], bool]) -> gc.MatrixParts:
+    def parts(self, opened: OpenMesh, cancel: Callable[[], bool]) -> gc.MatrixParts:
         """Return the parts of the matrix, which are still to be computed."""
         mesh, request = opened.mesh, self.request
-        sources, targets = self._parted(mesh, self.resolved(mesh, cancel))
+        sources, targets = self._sides(mesh, self.resolved(mesh, cancel))
         assert request.layout != "pairs", "pairs are in memory"  # noqa: S101
         return gc.MatrixParts(
             mesh,
-            sources,
-            targets,
+            sources.given,
+            None if self._is_symmetric else targets.given,
             layout=request.layout,
             **options_of(request),
             max_distance=request.max_distance,
-            dtype=dtype,
+            dtype=cast(Any, self.representation.dtype),
             cancel=cancel,
         )
 
@@ -167,16 +143,14 @@ class MatrixQuery(Query[MatrixRequest]):
         """
         mesh = opened.mesh
         points = self.resolved(mesh, cancel)
-        sources, targets = self._parted(mesh, points)
-        ends = components_of(mesh, sources), components_of(mesh, targets)
-        unreachable = self._unreachable(*ends, reached)
+        unreachable = self._unreachable(*self._sides(mesh, points), reached)
         warnings = self.noted(opened, points).warnings
         return Answer(self._about(mesh) | {"unreachable": unreachable, "warnings": warnings})
 
-    def value_count(self, size: MeshSize) -> int:
+    def value_count(self) -> int:
         """Return the number of cells, and of the values of each point."""
-        points = VALUES_OF_POINT * sum(self._count(size))
-        return points if self.request.layout == "sparse" else points + self._cells(size)
+        points = VALUES_OF_POINT * sum(self._count())
+        return points if self.request.layout == "sparse" else points + self._cells()
 
     def written_points(self) -> WrittenPoints:
         """Yield the sources, then other targets, where they are written one by one."""
@@ -185,36 +159,21 @@ class MatrixQuery(Query[MatrixRequest]):
             if points != "all":
                 yield from numbered(f"/{name}", points)
 
-    def resolved(self, mesh: gc.TriangleMesh, cancel: Callable[[], bool]) -> SurfacePoints:
-        """Return the sources, then the targets; raises as `resolve_points`."""
-        written = super().resolved(mesh, cancel)
-        before, after = (each == "all" for each in (self.request.sources, self.request.targets))
-        if self._is_symmetric and not before:
-            return [*written, *written]
-        if not (before or after):
-            return written
-        everywhere = [mesh.point(vertex) for vertex in range(len(mesh.vertices))]
-        return [*(everywhere if before else ()), *written, *(everywhere if after else ())]
-
-    def noted(self, opened: OpenMesh, points: SurfacePoints) -> OpenMesh:
-        """Return a mesh whose warnings also tell of points that were written one by one."""
-        before = len(opened.mesh.vertices) if self.request.sources == "all" else 0
-        return super().noted(opened, points[before:])
-
-    def rough_seconds(self, size: MeshSize) -> float:
+    def rough_seconds(self) -> float:
         """Return the cost of a sweep to the limit from each point of the smaller side."""
-        count = self._count(size)
-        share = rough_share(size, 1, self.request.max_distance)
-        one = sweep_cost(size.faces, self.request, share).seconds
+        count = self._count()
+        share = share_reached(self.size, 1, self.request.max_distance)
+        one = sweep_seconds(self.size.faces, self.request, share)
         return min(count) * one + PER_POINT * sum(count)
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep from the smaller side."""
-        sources, targets = self._parted(opened.mesh, points)
+        sources, targets = self._sides(opened.mesh, points)
         request = self.request
+        is_half = self._is_symmetric and request.layout != "pairs"
         found: Any = opened.solver.distance_matrix(
-            sources,
-            targets,
+            sources.given,
+            None if is_half else targets.given,
             request.max_distance,
             request.layout,
             **options_of(request),
@@ -226,64 +185,6 @@ class MatrixQuery(Query[MatrixRequest]):
                 "limit_exceeded", _CELLS, found.nnz, context.max_cells, setting, hint=hint
             )
         return self._answer(opened, sources, targets, found)
-
-    def forecast(self, opened: OpenMesh, points: SurfacePoints) -> Forecast:
-        """Return the cost of sweeps, exact ones to the farthest target along a straight line.
-
-        Of a large matrix some sources stand for all.
-        """
-        mesh, limit = opened.mesh, self.request.max_distance
-        sources, targets = self._parted(mesh, points)
-        seconds, times = PER_POINT * len(points), 1.0
-        found: Any
-        if self.request.layout == "pairs":
-            found = straight_along(mesh, sources, targets, limit)
-            cost = self._cost_of_pairs(mesh, sources, targets, found)
-            table = found.nbytes
-        else:
-            count = len(sources)
-            sources = sources[:: 1 + (count * len(targets) - 1) // _SAMPLED]
-            times = count / len(sources)
-            found = straight_between(mesh, sources, targets, limit)
-            radii = _farthest(found if count <= len(targets) else found.T)
-            cost = self._cost_of_sweeps(mesh, np.resize(radii, min(count, len(targets))))
-            table = found.nbytes
-            if self.request.layout == "sparse":
-                found = _sparse(found)
-                table = found.nnz * 12
-        answer = self._answer(opened, sources, targets, found)
-        return Forecast(Cost(cost.seconds + seconds, cost.memory_bytes + table), answer, times)
-
-    def _cost_of_sweeps(self, mesh: gc.TriangleMesh, radii: NDArray[np.float64]) -> Cost:
-        """Return the cost of sweeps to these farthest targets, where only exact ones end."""
-        request = as_swept(self.request, mesh)
-        if request.method != "exact":
-            limit = request.max_distance
-            radii = np.full(len(radii), math.inf if limit is None else limit)
-        threads = min(available_cores(), len(radii))
-        shares = share_within(mesh, radii).tolist()
-        return sweeps_cost(len(mesh.faces), request, shares, threads)
-
-    def _cost_of_pairs(
-        self,
-        mesh: gc.TriangleMesh,
-        sources: SurfacePoints,
-        targets: SurfacePoints,
-        distances: NDArray[np.float64],
-    ) -> Cost:
-        """Return the cost of searches and of sweeps, these from the side with fewer points."""
-        swept_from = SWEPT_FROM if as_swept(self.request, mesh).method == "exact" else 1
-        ends = min(sources, targets, key=lambda side: len(set(side)))
-        pairs = Counter(ends)
-        searches = sum(count for count in pairs.values() if count < swept_from)
-        radii = {end: 0.0 for end, count in pairs.items() if count >= swept_from}
-        for end, distance in zip(ends, distances.tolist(), strict=True):
-            if end in radii and distance < math.inf:
-                radii[end] = max(radii[end], distance)
-        costs = [search_cost(len(mesh.faces), searches)] if searches else []
-        if radii:
-            costs.append(self._cost_of_sweeps(mesh, np.array(list(radii.values()))))
-        return Cost(sum(cost.seconds for cost in costs), sum(cost.memory_bytes for cost in costs))
 
     @cached_property
     def _is_symmetric(self) -> bool:
@@ -298,41 +199,43 @@ class MatrixQuery(Query[MatrixRequest]):
             f"ask for {media_type} with `Prefer: respond-async`: such a job may have more cells"
         )
 
-    def _check_in_memory(self, size: MeshSize, settings: Settings) -> None:
+    def _check_in_memory(self, settings: Settings) -> None:
         """Refuse too many sources, or cells where their number is known before solving."""
         hint = self._as_job
-        check_count("sources", self._count(size)[0], settings, "max_sources", hint=hint)
+        check_count("sources", self._count()[0], settings, "max_sources", hint=hint)
         if self.request.layout != "sparse" or self.request.max_distance is None:
-            check_count(_CELLS, self._cells(size), settings, "max_matrix_cells", hint=hint)
+            check_count(_CELLS, self._cells(), settings, "max_matrix_cells", hint=hint)
 
-    def _count(self, size: MeshSize) -> tuple[int, int]:
+    def _count(self) -> tuple[int, int]:
         """Return the numbers of sources and of targets."""
         sources, targets = (
-            size.vertices if points == "all" else len(points)
+            self.size.vertices if points == "all" else len(points)
             for points in (self.request.sources, self.request.targets)
         )
         return sources, targets
 
-    def _cells(self, size: MeshSize) -> int:
-        sources, targets = self._count(size)
+    def _cells(self) -> int:
+        sources, targets = self._count()
         return sources if self.request.layout == "pairs" else sources * targets
 
-    def _parted(
-        self, mesh: gc.TriangleMesh, points: SurfacePoints
-    ) -> tuple[SurfacePoints, SurfacePoints]:
-        sources = self.request.sources
-        count = len(mesh.vertices) if sources == "all" else len(sources)
-        return points[:count], points[count:]
+    def _sides(self, mesh: gc.TriangleMesh, written: SurfacePoints) -> "tuple[_Side, _Side]":
+        """Return the sources and the targets, of which some were written one by one."""
+        request = self.request
+        if request.sources == "all":
+            sources, rest = _Side(mesh, None), written
+        else:
+            count = len(request.sources)
+            sources, rest = _Side(mesh, written[:count]), written[count:]
+        if self._is_symmetric:
+            return sources, sources
+        return sources, _Side(mesh, None if request.targets == "all" else rest)
 
-    def _answer(
-        self, opened: OpenMesh, sources: SurfacePoints, targets: SurfacePoints, found: Any
-    ) -> Answer:
-        mesh, layout = opened.mesh, self.request.layout
-        starts, ends = components_of(mesh, sources), components_of(mesh, targets)
+    def _answer(self, opened: OpenMesh, sources: "_Side", targets: "_Side", found: Any) -> Answer:
+        layout = self.request.layout
         members: dict[str, Any] = {
-            **self._about(mesh),
-            "sources": _describe_ends(mesh, sources, starts),
-            "targets": _describe_ends(mesh, targets, ends),
+            **self._about(opened.mesh),
+            "sources": Elements(len(sources), sources.described),
+            "targets": Elements(len(targets), targets.described),
         }
         arrays: tuple[str, ...] = ("distances",)
         if layout == "sparse":
@@ -345,7 +248,7 @@ class MatrixQuery(Query[MatrixRequest]):
             table = table_of_matrix(found)
         members |= {
             "distances": found,
-            "unreachable": self._unreachable(starts, ends, int(np.isfinite(found).sum())),
+            "unreachable": self._unreachable(sources, targets, int(np.isfinite(found).sum())),
             "warnings": opened.warnings,
         }
         points = len(sources) + len(targets)
@@ -356,15 +259,14 @@ class MatrixQuery(Query[MatrixRequest]):
         return {
             "kind": self.kind,
             "mesh_id": self.mesh_id,
-            **method_of(self.request),
+            "method": self.request.method,
             "error_bound": bound_on(mesh, self.request),
             "layout": self.request.layout,
         }
 
-    def _unreachable(
-        self, starts: NDArray[np.int64], ends: NDArray[np.int64], reached: int
-    ) -> dict[str, int]:
-        """Return the number of missing distances by reason, from the components of both sides."""
+    def _unreachable(self, sources: "_Side", targets: "_Side", reached: int) -> dict[str, int]:
+        """Return the number of missing distances by reason."""
+        starts, ends = sources.components, targets.components
         if self.request.layout == "pairs":
             cells, connected = len(starts), int(np.count_nonzero(starts == ends))
         else:
@@ -374,24 +276,45 @@ class MatrixQuery(Query[MatrixRequest]):
         return {"disconnected": cells - connected, "beyond_max_distance": connected - reached}
 
 
-def _describe_ends(
-    mesh: gc.TriangleMesh, points: SurfacePoints, components: NDArray[np.int64]
-) -> Sequence[Mapping[str, Any]]:
-    return [
-        {**describe_point(mesh, point), "component": component}
-        for point, component in zip(points, components.tolist(), strict=True)
-    ]
+@dataclass(frozen=True)
+class _Side:
+    """The points on one side of a matrix: all vertices, or those that were written one by one.
 
+    There is no object for each vertex: many would take longer than the sweeps.
+    """
 
-def _sparse(table: NDArray[np.float64]) -> "coo_array":
-    """Return the finite distances of a matrix."""
-    from scipy.sparse import coo_array
+    mesh: gc.TriangleMesh
+    points: SurfacePoints | None
+    """None for all vertices"""
 
-    cells = np.nonzero(np.isfinite(table))
-    return coo_array((table[cells], cells), shape=table.shape)
+    def __len__(self) -> int:
+        return len(self.mesh.vertices) if self.points is None else len(self.points)
 
+    @property
+    def given(self) -> Sequence[int | gc.SurfacePoint]:
+        """The points, as the library takes them."""
+        return range(len(self.mesh.vertices)) if self.points is None else self.points
 
-def _farthest(distances: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the largest finite distance of each row, or 0."""
-    farthest: NDArray[np.float64] = np.where(np.isfinite(distances), distances, 0.0).max(axis=1)
-    return farthest
+    @cached_property
+    def components(self) -> NDArray[np.int64]:
+        """The connected component of each point."""
+        if self.points is None:
+            return self.mesh.components.astype(np.int64)
+        return components_of(self.mesh, self.points)
+
+    def described(self, part: slice) -> list[dict[str, Any]]:
+        """Return the members of some of the points."""
+        components = self.components[part].tolist()
+        if self.points is not None:
+            described = [describe_point(self.mesh, point) for point in self.points[part]]
+        else:
+            indices = range(len(self))[part]
+            positions = self.mesh.vertices[part].tolist()
+            described = [
+                {"vertex": vertex, "position": position}
+                for vertex, position in zip(indices, positions, strict=True)
+            ]
+        return [
+            {**point, "component": component}
+            for point, component in zip(described, components, strict=True)
+        ]

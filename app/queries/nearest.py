@@ -7,17 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.encoding import CSV, GEOJSON, JSON, Answer
+from app.encoding import CSV, JSON, Answer
 from app.queries.accuracy import CERTAIN
-from app.queries.base import VALUES_OF_POINT, ExecutionContext, Forecast, Query
-from app.queries.cost_model import (
-    PER_POINT,
-    Cost,
-    rough_share,
-    share_within,
-    straight_between,
-    sweep_cost,
-)
+from app.queries.base import VALUES_OF_POINT, ExecutionContext, Query
+from app.queries.cost_model import PER_POINT, share_reached, sweep_seconds
 from app.queries.points import (
     SurfacePoints,
     components_of,
@@ -25,8 +18,8 @@ from app.queries.points import (
     describe_point,
     numbered,
 )
-from app.queries.validation import MeshSize, WrittenPoints, invalid_fields
-from app.queries.views import point_features, table_of_points
+from app.queries.validation import WrittenPoints, invalid_fields
+from app.queries.views import table_of_points
 from app.schemas.requests import Accuracy, NearestRequest
 from app.store.meshes import OpenMesh
 
@@ -36,7 +29,7 @@ class NearestQuery(Query[NearestRequest]):
 
     kind = "nearest"
     model = NearestRequest
-    offers: Sequence[str] = (JSON, CSV, GEOJSON)
+    offers: Sequence[str] = (JSON, CSV)
     hint = "ask for a smaller k"
 
     @classmethod
@@ -48,7 +41,7 @@ class NearestQuery(Query[NearestRequest]):
             raise invalid_fields(["/k"], message)
         return request
 
-    def value_count(self, size: MeshSize) -> int:
+    def value_count(self) -> int:
         """Return the number of values of ``k`` candidates."""
         return (VALUES_OF_POINT + 1) * self.request.k
 
@@ -57,11 +50,11 @@ class NearestQuery(Query[NearestRequest]):
         request = self.request
         return chain([("/source", request.source)], numbered("/candidates", request.candidates))
 
-    def rough_seconds(self, size: MeshSize) -> float:
+    def rough_seconds(self) -> float:
         """Return the cost of a sweep to the limit."""
-        share = rough_share(size, 1, self.request.max_distance)
-        sweep = sweep_cost(size.faces, Accuracy(), share)
-        return sweep.seconds + PER_POINT * len(self.request.candidates)
+        share = share_reached(self.size, 1, self.request.max_distance)
+        sweep = sweep_seconds(self.size.faces, Accuracy(), share)
+        return sweep + PER_POINT * len(self.request.candidates)
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep to the k-th nearest."""
@@ -71,23 +64,6 @@ class NearestQuery(Query[NearestRequest]):
             source, candidates, request.k, request.max_distance, **context.options
         )
         return self._answer(opened, points, found.indices, found.distances)
-
-    def forecast(self, opened: OpenMesh, points: SurfacePoints) -> Forecast:
-        """Return the cost of a sweep to the candidate that is k-th nearest in space."""
-        mesh, k = opened.mesh, self.request.k
-        source, *candidates = points
-        straight = straight_between(mesh, [source], candidates, self.request.max_distance)[0]
-        order = np.argsort(straight, kind="stable")[:k]
-        order = order[np.isfinite(straight[order])]
-        if len(order) == k:
-            share = float(share_within(mesh, straight[order[-1]]))
-        elif self.request.max_distance is not None:
-            share = float(share_within(mesh, self.request.max_distance))
-        else:
-            share = 1.0
-        sweep = sweep_cost(len(mesh.faces), Accuracy(), share)
-        cost = Cost(sweep.seconds + PER_POINT * len(points), sweep.memory_bytes)
-        return Forecast(cost, self._answer(opened, points, order, straight[order]))
 
     def _answer(
         self,
@@ -106,7 +82,6 @@ class NearestQuery(Query[NearestRequest]):
             "kind": self.kind,
             "mesh_id": self.mesh_id,
             "method": "exact",
-            "exact": True,
             "error_bound": CERTAIN,
             "source": describe_point(mesh, source),
             "nearest": found,
@@ -121,5 +96,4 @@ class NearestQuery(Query[NearestRequest]):
             members,
             shown=("nearest",),
             table=table_of_points("candidate", found),
-            points=lambda: point_features("candidate", found),
         )

@@ -5,28 +5,17 @@ from itertools import chain
 from typing import Any
 
 import geodesic_core as gc
-from app.encoding import CSV, GEOJSON, JSON, OBJ, SVG, Answer
+from app.encoding import Answer
 from app.queries.accuracy import (
     affinity_keys_of,
-    as_swept,
-    expected_stats,
-    method_of,
     solve_field,
     stats_of,
     with_default_accuracy,
 )
-from app.queries.base import VALUES_OF_POINT, ExecutionContext, Forecast, Query
-from app.queries.cost_model import (
-    PER_PATH,
-    PER_POINT,
-    Cost,
-    rough_share,
-    share_within,
-    straight_to_nearest,
-    sweep_cost,
-    typical_edge,
-)
-from app.queries.outline import expected_outline, no_outline, outline_of
+from app.queries.base import VALUES_OF_POINT, ExecutionContext, Query
+from app.queries.cost_model import PER_PATH, PER_POINT, share_reached, sweep_seconds
+from app.queries.lines import OFFERS
+from app.queries.outline import no_outline, outline_of
 from app.queries.points import (
     SurfacePoints,
     checkpoint,
@@ -35,17 +24,13 @@ from app.queries.points import (
     numbered,
     point_count,
     points_in,
-    positions_of,
     to_point_or_curve,
 )
-from app.queries.validation import MeshSize, WrittenPoints, check_count, check_json_size
+from app.queries.validation import WrittenPoints, check_count, check_json_size
 from app.queries.views import line_of
 from app.schemas.requests import PathsRequest
 from app.settings import Settings
 from app.store.meshes import OpenMesh
-
-_TRIED = 64
-"""Targets of the straight paths that stand for all in an estimate, about."""
 
 
 class PathsQuery(Query[PathsRequest]):
@@ -53,7 +38,7 @@ class PathsQuery(Query[PathsRequest]):
 
     kind = "paths"
     model = PathsRequest
-    offers: Sequence[str] = (JSON, OBJ, CSV, SVG, GEOJSON)
+    offers = OFFERS
     hint = "ask for fewer targets at once"
 
     @classmethod
@@ -61,7 +46,7 @@ class PathsQuery(Query[PathsRequest]):
         """Name error or effort."""
         return with_default_accuracy(request)
 
-    def value_count(self, size: MeshSize) -> int:
+    def value_count(self) -> int:
         """Return the least number of values: those of the ends of the paths."""
         return VALUES_OF_POINT * len(self.request.targets)
 
@@ -75,16 +60,16 @@ class PathsQuery(Query[PathsRequest]):
         request = self.request
         return chain(points_in("/source", request.source), numbered("/targets", request.targets))
 
-    def check_limits(self, size: MeshSize, settings: Settings) -> None:
+    def check_limits(self, settings: Settings) -> None:
         """Refuse too many points of a curve."""
         check_count("sources", point_count(self.request.source), settings, "max_sources")
 
-    def rough_seconds(self, size: MeshSize) -> float:
+    def rough_seconds(self) -> float:
         """Return the cost of a sweep to the limit, and of the paths."""
         request = self.request
-        share = rough_share(size, point_count(request.source), request.max_distance)
-        sweep = sweep_cost(size.faces, request, share, paths=True)
-        return sweep.seconds + (PER_PATH + PER_POINT) * len(request.targets)
+        share = share_reached(self.size, point_count(request.source), request.max_distance)
+        sweep = sweep_seconds(self.size.faces, request, share)
+        return sweep + (PER_PATH + PER_POINT) * len(request.targets)
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep once, then trace path by path, as long as they fit into the answer."""
@@ -112,25 +97,6 @@ class PathsQuery(Query[PathsRequest]):
             found.append(outline_of(path))
         return self._answer(opened, start, targets, found, stats_of(field.stats))
 
-    def forecast(self, opened: OpenMesh, points: SurfacePoints) -> Forecast:
-        """Return the cost of a sweep and of the paths, and some paths straight to their targets."""
-        mesh, limit = opened.mesh, self.request.max_distance
-        starts, targets = self._parted(points)
-        start = to_point_or_curve(mesh, "/source", self.request.source, starts)
-        share = 1.0 if limit is None else float(share_within(mesh, limit))
-        sweep = sweep_cost(len(mesh.faces), as_swept(self.request, mesh), share, paths=True)
-        seconds = sweep.seconds + (PER_PATH + PER_POINT) * len(targets)
-        some = targets[:: 1 + len(targets) // _TRIED]
-        edge = typical_edge(mesh)
-        lengths, nearest = straight_to_nearest(mesh, starts, some, limit)
-        ends = positions_of(mesh, starts)[nearest], positions_of(mesh, some)
-        found = [
-            expected_outline(mesh, here, there, length, edge)
-            for here, there, length in zip(*ends, lengths.tolist(), strict=True)
-        ]
-        answer = self._answer(opened, start, some, found, expected_stats(mesh, share))
-        return Forecast(Cost(seconds, sweep.memory_bytes), answer, len(targets) / len(some))
-
     def _parted(self, points: SurfacePoints) -> tuple[SurfacePoints, SurfacePoints]:
         """Return the points of the source, and the targets."""
         count = point_count(self.request.source)
@@ -153,7 +119,7 @@ class PathsQuery(Query[PathsRequest]):
             {
                 "kind": self.kind,
                 "mesh_id": self.mesh_id,
-                **method_of(self.request),
+                "method": self.request.method,
                 "source": describe_point_or_curve(mesh, start),
                 "paths": paths,
                 "stats": stats,

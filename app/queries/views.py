@@ -1,4 +1,4 @@
-"""Answers as tables, lines, points and surfaces, for the formats that are written from these."""
+"""Answers as tables, lines and surfaces, for the formats that are written from these."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import geodesic_core as gc
-from app.encoding import Line, PointFeature, Surface, Table
+from app.encoding import Line, Surface, Table
 from app.encoding.views import Column, Values, rows_of
 
 
@@ -44,7 +44,6 @@ def line_of(outline: Mapping[str, Any], number: int | None = None) -> Line:
 
 def lines_of(levels: Sequence[Mapping[str, Any]]) -> list[Line]:
     """Return isolines, and a line without points for each level that has none."""
-    highest = max(level["level"] for level in levels)
     none = {"closed": None, "length": None, "points": np.empty((0, 3))}
     return [
         Line(
@@ -57,7 +56,6 @@ def lines_of(levels: Sequence[Mapping[str, Any]]) -> list[Line]:
             },
             f"level_{each['level']!r}",
             is_closed=bool(line["closed"]),
-            shade=each["level"] / highest,
         )
         for each in levels
         for i, line in enumerate(each["lines"] or [none])
@@ -105,18 +103,8 @@ def table_of_sparse(rows: Column, columns: Column, distances: Column) -> Table:
 _MATRIX = "source", "target", "distance"
 
 
-def point_features(index: str, found: Sequence[Mapping[str, Any] | None]) -> list[PointFeature]:
-    """Return described points as features; numbered by ``index`` unless they have that member."""
-    return [
-        PointFeature(None, {index: i})
-        if each is None
-        else PointFeature(each["position"], {index: i, **_without_position(each)})
-        for i, each in enumerate(found)
-    ]
-
-
 def table_of_points(index: str, found: Sequence[Mapping[str, Any] | None]) -> Table:
-    """Return a row for each of the same points."""
+    """Return a row for each described point, numbered by ``index`` unless it has that member."""
 
     def rows() -> Iterator[Sequence[Any]]:
         for i, described in enumerate(found):
@@ -131,10 +119,6 @@ def table_of_points(index: str, found: Sequence[Mapping[str, Any] | None]) -> Ta
             )
 
     return Table([index, "distance", *"xyz", "vertex", "face", *"uvw"], rows)
-
-
-def _without_position(members: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in members.items() if name != "position"}
 
 
 _NOTHING = None, None, None

@@ -66,7 +66,6 @@ class DistancesAnswer(BaseModel):
     kind: Literal["distances"]
     mesh_id: str
     method: Method
-    exact: bool
     error_bound: ErrorBound
     sources: list[ResolvedSource | ResolvedCurveSource]
     targets: list[ResolvedPoint] | None = Field(default=None, description="The targets, if given")
@@ -112,7 +111,6 @@ class IsolinesAnswer(BaseModel):
     kind: Literal["isolines"]
     mesh_id: str
     method: Method
-    exact: bool
     error_bound: ErrorBound = Field(description="Error bound of the distance of each line")
     chord_error: float = Field(
         description="Largest distance of chords from the exact lines, in mesh units"
@@ -168,7 +166,6 @@ class SearchStep(BaseModel):
 
     leg: int = Field(description="Number of the leg, from 0")
     name: StepName
-    seconds: float
     bound: float = Field(
         description="The smallest upper bound of the leg's length that is known after the step; "
         "after `exact`, the length"
@@ -195,13 +192,18 @@ class PathAnswer(Outline):
     kind: Literal["path"]
     mesh_id: str
     method: Method
-    exact: bool
     source: ResolvedPoint
     target: ResolvedPoint
     waypoints: list[ResolvedPoint]
-    steps: list[SearchStep] | None = Field(
-        default=None, description="Steps of the search, leg by leg, with `explain`"
-    )
+    warnings: list[str]
+
+
+class StepsAnswer(BaseModel):
+    """The steps of the search for a path."""
+
+    kind: Literal["steps"]
+    mesh_id: str
+    steps: list[SearchStep] = Field(description="Leg by leg; empty where there is no path")
     warnings: list[str]
 
 
@@ -217,7 +219,6 @@ class PathsAnswer(BaseModel):
     kind: Literal["paths"]
     mesh_id: str
     method: Method
-    exact: bool
     source: ResolvedPoint | ResolvedCurve
     paths: list[PathTo]
     stats: dict[str, Any]
@@ -239,7 +240,6 @@ class MatrixAnswer(BaseModel):
     kind: Literal["matrix"]
     mesh_id: str
     method: Method
-    exact: bool
     error_bound: ErrorBound
     layout: Layout
     sources: list[MatrixEnd]
@@ -272,7 +272,6 @@ class NearestAnswer(BaseModel):
     kind: Literal["nearest"]
     mesh_id: str
     method: Method
-    exact: bool
     error_bound: ErrorBound
     source: ResolvedPoint
     nearest: list[NearestPoint] = Field(description="Fewer than `k` if fewer are reachable")
@@ -281,27 +280,6 @@ class NearestAnswer(BaseModel):
         description="Number of missing candidates, by reason, if there are fewer than `k`",
     )
     warnings: list[str]
-
-
-class Estimate(BaseModel):
-    """The expected cost of an answer, without computing it."""
-
-    kind: Literal["estimate"]
-    mesh_id: str
-    seconds: float = Field(
-        description="Seconds on a free worker. The actual time can differ by a factor of 3 or "
-        "more, depending on the mesh and the machine"
-    )
-    memory_bytes: int = Field(
-        description="Memory in addition to the mesh, as `GEODESIC_QUERY_MEMORY_BYTES` limits it; "
-        "within a factor of 3"
-    )
-    response_bytes: int = Field(
-        description="Size of the body before compression, within 5 %. With `max_distance`, and for "
-        "paths and isolines, it assumes straight geodesics: on winding surfaces the body is "
-        "several times as large"
-    )
-    media_type: str = Field(description="Media type of the estimated response")
 
 
 class LocatedPoint(ResolvedPoint):

@@ -92,6 +92,12 @@ class ListParameters(StrictModel):
     cursor: str | None = Field(default=None, description="`next_cursor` of the previous part")
 
 
+class MeshListParameters(ListParameters):
+    """The part of a list of meshes to answer with."""
+
+    name: MeshName | None = Field(default=None, description="Only meshes of this name")
+
+
 class Sample(BaseModel):
     """Number of elements of a kind, and the ids of the first ten; an edge has two."""
 
@@ -166,8 +172,18 @@ class MeshDocument(BaseModel):
     mean_edge_length: float
 
 
-class MeshList(BaseModel):
-    """A part of the meshes in the store, in the order of their ids."""
+class ListedMesh(BaseModel):
+    """A mesh in a list; its own address has the whole report."""
 
-    meshes: list[MeshDocument]
+    id: str
+    name: str | None = Field(description="The name given with its first upload, if any")
+    vertices: int
+    faces: int
+    created: str = Field(description="When the mesh was stored, RFC 3339")
+
+
+class MeshList(BaseModel):
+    """A part of the meshes in the store, the newest first."""
+
+    meshes: list[ListedMesh]
     next_cursor: str | None = None

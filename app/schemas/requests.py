@@ -7,9 +7,7 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
-    StrictBool,
     StrictInt,
-    field_validator,
     model_validator,
 )
 from pydantic_core import PydanticCustomError
@@ -187,11 +185,8 @@ class BordersRequest(AmongBarriers):
     )
 
 
-_LONGEST = "Longest path to look for, past all waypoints, in mesh units"
-
-
-class PathRequest(AccuracyOrEffort, AmongBarriers):
-    """The shortest path from ``source`` to ``target``, past ``waypoints`` in their order."""
+class Stops(AmongBarriers):
+    """A source, a target, and ``waypoints`` on the way, in their order."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -208,12 +203,17 @@ class PathRequest(AccuracyOrEffort, AmongBarriers):
         default=[],
         description="The path is shortest from each stop to the next; for `exact` only",
     )
-    max_distance: NonNegative | None = Field(default=None, description=_LONGEST)
-    explain: StrictBool = Field(
-        default=False,
-        description="Add `steps`, an account of each step of the search; for `exact` and JSON "
-        "only. Such an answer is not cached, since it contains timings",
+    max_distance: NonNegative | None = Field(
+        default=None, description="Longest path to look for, past all waypoints, in mesh units"
     )
+
+
+class PathRequest(AccuracyOrEffort, Stops):
+    """The shortest path from ``source`` to ``target``, past ``waypoints`` in their order."""
+
+
+class StepsRequest(Stops):
+    """The steps of the search for the exact path."""
 
 
 class PathsRequest(AccuracyOrEffort, AmongBarriers):
@@ -298,27 +298,18 @@ class LocateRequest(QueryBody):
     )
 
 
-AnswerFormat = Literal["json", "npy", "npz", "octets", "obj", "ply", "csv", "svg", "geojson"]
+AnswerFormat = Literal["json", "npy", "npz", "octets", "obj", "ply", "csv"]
+
+
+_FORMAT: Any = Field(default=None, description="Overrides `Accept`")
 
 
 class AnswerParameters(StrictModel):
-    """The representation of the answer, or an estimate instead of it."""
+    """The representation of the answer."""
 
-    format: AnswerFormat | None = Field(default=None, description="Overrides `Accept`")
+    format: AnswerFormat | None = _FORMAT
     dtype: Literal["float64", "float32"] = Field(
         default="float64", description="Type of the numbers in `npy`, `npz` and `octets`"
-    )
-    estimate: bool = Field(
-        default=False,
-        description="Do not compute; answer with an `Estimate` of the cost, in JSON",
-    )
-
-
-class PathAnswerParameters(AnswerParameters):
-    """The representation of a path, and whether with the steps of the search."""
-
-    explain: bool = Field(
-        default=False, description="Add `steps`, an account of each step of the search"
     )
 
 
@@ -328,10 +319,10 @@ _SPELLINGS = (
 )
 
 
-class PathParameters(PathAnswerParameters, AccuracyOrEffort):
-    """The stops of a path.
+class PathParameters(StrictModel):
+    """The stops of a path, and how to find and to write it.
 
-    Each is a vertex as ``12`` or ``v12``, a point of an edge as ``e12-13:0.3``, of a face as
+    Each stop is a vertex as ``12`` or ``v12``, a point of an edge as ``e12-13:0.3``, of a face as
     ``f7:0.2,0.3,0.5``, or a position as ``p1,2,3``.
     """
 
@@ -342,13 +333,8 @@ class PathParameters(PathAnswerParameters, AccuracyOrEffort):
         description="A waypoint, in the same spellings; repeat it for several, in order",
         examples=[["v7"]],
     )
-    max_distance: NonNegative | None = Field(default=None, description=_LONGEST)
-
-    @field_validator("relative_error", "absolute_error", "effort", "max_distance", mode="before")
-    @classmethod
-    def _number_of(cls, text: str) -> float | str:
-        # A body has numbers, an address only texts.
-        try:
-            return float(text)
-        except ValueError:
-            return text
+    method: Method = Field(
+        default="exact",
+        description="`approximate` within an error of 0.001, `fast` with an effort of 2",
+    )
+    format: AnswerFormat | None = _FORMAT

@@ -29,7 +29,7 @@ class ProblemDocument(BaseModel):
     errors: list[FaultDocument] | None = None
     limit: float | None = None
     actual: float | None = None
-    setting: str | None = None
+    setting: str | None = Field(default=None, description="The limit, as in `limits` of `/v1`")
     hint: str | None = None
 
 
@@ -45,7 +45,7 @@ class JobDocument(BaseModel):
     started: str | None = Field(default=None, description="When a worker began the job")
     finished: str | None = None
     problem: ProblemDocument | None = Field(default=None, description="The problem of a failed job")
-    links: dict[str, str] = Field(description="Paths of its results and events")
+    links: dict[str, str] = Field(description="Paths of itself, its results and its events")
 
 
 class JobList(BaseModel):
@@ -58,7 +58,7 @@ class JobList(BaseModel):
 class Health(BaseModel):
     """State of the service."""
 
-    status: Literal["ok", "starting"]
+    status: Literal["ok"]
 
 
 class Index(BaseModel):
@@ -78,9 +78,7 @@ class About(BaseModel):
     mesh_formats: list[str]
     answer_formats: dict[str, str]
     samples: list[str]
-    limits: dict[str, int | float] = Field(
-        description="Each limit, by the environment variable that sets it"
-    )
+    limits: dict[str, int | float] = Field(description="Each limit, by its name")
 
 
 class ProblemCode(BaseModel):

@@ -2,16 +2,12 @@
 
 A query takes these steps, one type for each::
 
-    wire model      the body of a request, such as ``DistancesRequest``        app.schemas
-    QueryRequest    the request: mesh, caller, deadline, preferences           app.http
-    Query           the validated query, with a stable hash                    app.queries
-    Representation  the form to answer in: media type, dtype, coding           app.encoding
-    Question        query, representation, and the name of the client          app.service
-    Task            ``RunQuery``, the work of a worker, and its scheduling     app.engine
-    Answer          the members of the answer, as the query's solver found     app.encoding
-    Encoded         the parts of the body, and headers                         app.encoding
-    Result          the body and its ``ResultManifest``, in memory or files    app.store
-    TaskResult      the result on its way back, with the seconds it took       app.engine
+    wire model   the body of a request, such as ``DistancesRequest``          app.schemas
+    Query        the validated query, and the form to answer in               app.queries
+    Task         ``RunQuery``, the work of a worker, and its scheduling       app.engine
+    Answer       the members of the answer, as the query's solver found       app.encoding
+    Result       the body and its ``ResultManifest``, in memory or files      app.store
+    TaskResult   the result on its way back, with the seconds it took         app.engine
 
 Task to TaskResult are skipped where the store has the result. A ``Job`` runs the same steps after
 its request has ended, and records the name of the result.
@@ -20,14 +16,15 @@ its request has ended, and records the name of the result.
 from collections import Counter, defaultdict
 from collections.abc import Awaitable, Callable, Mapping
 from functools import partial
+from typing import Any
 
 from app.engine.interface import Engine, ProgressCallback
 from app.engine.single_flight import SingleFlight
-from app.engine.work import EstimateQuery, RunQuery, Task, TaskResult
-from app.queries import Estimate, MatrixQuery, result_key
+from app.engine.work import RunQuery, Task, TaskResult
+from app.queries import MatrixQuery, Query, result_key
 from app.service.matrix_parts import MatrixInParts
 from app.service.progress import ignore_progress
-from app.service.question import Question
+from app.service.request_context import RequestContext
 from app.service.time_limit import time_limit
 from app.settings import Settings
 from app.store.mesh_catalog import MeshCatalog
@@ -42,7 +39,7 @@ _Run = Callable[[ProgressCallback], Awaitable[TaskResult]]
 
 
 class Answering:
-    """Finds or computes the answers to questions; the same question is computed once at a time."""
+    """Finds or computes the answers to queries; the same query is computed once at a time."""
 
     def __init__(
         self,
@@ -66,38 +63,35 @@ class Answering:
         self.solve_seconds: defaultdict[str, float] = defaultdict(float)
         """Seconds of solving, by kind of query"""
 
-    async def answer(self, question: Question, deadline_s: float, *, as_file: bool) -> Answered:
-        """Return the answer to a question within a deadline, ``as_file`` with files."""
-        async with time_limit(self._settings, deadline_s):
-            result, seconds = await self.find_or_compute(question, ignore_progress)
+    async def answer(
+        self, query: Query[Any], context: RequestContext, *, as_file: bool
+    ) -> Answered:
+        """Return the answer to a query within a deadline, ``as_file`` with files."""
+        async with time_limit(self._settings, context.deadline_s):
+            result, seconds = await self.find_or_compute(
+                query, context.caller.name, ignore_progress
+            )
             if as_file:
                 result = await self._results.with_files(result)
             return result, seconds
 
-    async def estimate(
-        self, question: Question, deadline_s: float
-    ) -> tuple[Estimate, PhaseSeconds]:
-        """Have a worker, which has the mesh, estimate the cost of the answer to a question."""
-        query, representation = question.query, question.representation
-        query.check_answer(representation, question.size, self._settings, as_job=True)
-        work = EstimateQuery(query, representation)
-        task = Task(work, question.client, query.affinity_keys, is_small=True)
-        async with time_limit(self._settings, deadline_s):
-            with self._catalog.pinned(query.mesh_id):
-                done = await self.engine.run(task, ignore_progress)
-        assert done.estimate is not None, "this kind of work estimates"  # noqa: S101
-        return done.estimate, done.seconds
-
     async def find_or_compute(
-        self, question: Question, on_progress: ProgressCallback, *, is_promised: bool = False
+        self,
+        query: Query[Any],
+        client: str,
+        on_progress: ProgressCallback,
+        *,
+        is_promised: bool = False,
     ) -> Answered:
-        """Return the answer to a question; a promised one waits however full the queue is."""
-        query, size = question.query, question.size
+        """Return the answer to a query of a client, whose work the engine counts together.
+
+        A promised one waits however full the queue is.
+        """
         with self._catalog.pinned(query.mesh_id):
-            query.check_answer(question.representation, size, self._settings, as_job=is_promised)
-            name, run = self._computation(question, is_promised=is_promised)
+            query.check_answer(self._settings, as_job=is_promised)
+            name, run = self._computation(query, client, is_promised=is_promised)
             # Small work costs less than to look for what another service has computed.
-            if self._is_shared and not query.is_small(size):
+            if self._is_shared and not query.is_small:
                 await self._results.index(name)
             stored = await self._results.find(name)
             self.lookups["miss" if stored is None else "hit"] += 1
@@ -106,25 +100,22 @@ class Answering:
             counted = partial(self._run, run, query.kind)
             done = await self._flights.join(name, counted, on_progress, is_promised=is_promised)
             assert done.result is not None, "this kind of work answers"  # noqa: S101
-            result = self._results.add(done.result, is_reusable=query.is_repeatable)
+            result = self._results.add(done.result)
             return result, done.seconds
 
-    def _computation(self, question: Question, *, is_promised: bool) -> tuple[str, _Run]:
-        """Return the name of the result of a question, and what computes it."""
-        query, size, representation = question.query, question.size, question.representation
-        key = result_key(query, representation)
-        if isinstance(query, MatrixQuery) and query.is_in_parts(
-            representation, size, self._settings, as_job=is_promised
-        ):
+    def _computation(
+        self, query: Query[Any], client: str, *, is_promised: bool
+    ) -> tuple[str, _Run]:
+        """Return the name of the result of a query, and what computes it."""
+        key = result_key(query)
+        if isinstance(query, MatrixQuery) and query.is_in_parts(self._settings, as_job=is_promised):
             # In parts a sparse matrix has no limit of cells: it is another answer than in memory.
             name = result_name(query.mesh_id, f"{key}.parts")
-            parts = MatrixInParts(
-                query, size, representation, question.client, name, self.engine, self._results
-            )
+            parts = MatrixInParts(query, client, name, self.engine, self._results)
             return name, parts.run
         name = result_name(query.mesh_id, key)
-        work, is_small = RunQuery(query, representation, name), query.is_small(size)
-        task = Task(work, question.client, query.affinity_keys, is_small, is_promised)
+        work = RunQuery(query, name)
+        task = Task(work, client, query.affinity_keys, query.is_small, is_promised)
         return name, partial(self.engine.run, task)
 
     async def _run(self, run: _Run, kind: str, on_progress: ProgressCallback) -> TaskResult:

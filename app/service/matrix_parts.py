@@ -10,11 +10,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from app.encoding import Representation
 from app.engine.interface import Engine, ProgressCallback
 from app.engine.work import ComputePart, JoinParts, Task, TaskResult
 from app.engine.worker import REACHED
-from app.queries import MatrixQuery, MeshSize
+from app.queries import MatrixQuery
 from app.store.results import Result, ResultStore
 
 NotePart = Callable[[int, float], None]
@@ -29,11 +28,8 @@ class MatrixInParts:
     """The computation of one matrix."""
 
     query: MatrixQuery
-    size: MeshSize
-    """The size of the mesh"""
-    representation: Representation
     client: str
-    """The name of the caller, as in a question"""
+    """The name of the caller, whose work the engine counts together"""
     result_name: str
     engine: Engine
     results: ResultStore
@@ -45,8 +41,8 @@ class MatrixInParts:
 
         Raises ``ProblemError`` where the store has no room, and as ``Engine.run`` does.
         """
-        query, dtype = self.query, self.representation.dtype
-        areas = query.areas_of_parts(self.size)
+        query = self.query
+        areas = query.areas_of_parts()
         shares = [0.0] * len(areas)
         whole = sum(areas) / (1.0 - _JOINING)
 
@@ -55,13 +51,13 @@ class MatrixInParts:
             done = sum(area * share for area, share in zip(areas, shares, strict=True))
             on_progress(done / whole)
 
-        needed = query.bytes_in_parts(self.representation, self.size)
-        with self.results.reserving(needed) as reserve, self._using_parts():
+        needed = query.bytes_in_parts()
+        with self.results.reserving(self.client, needed) as reserve, self._using_parts():
             await self._compute(len(areas), note, reserve)
             found = [self._found[part] for part in range(len(areas))]
             reached = sum(map(_reached, found))
             names = [part.name for part in found]
-            work = JoinParts(query, dtype, names, reached, self.result_name)
+            work = JoinParts(query, names, reached, self.result_name)
             done = await self.engine.run(self._task(work), lambda _share: None)
             seconds = {**done.seconds, "compute": self._seconds + done.seconds["compute"]}
         for part in found:
@@ -90,7 +86,7 @@ class MatrixInParts:
                 for each in done:
                     found = each.result()
                     size, reached = found.manifest.size, _reached(found)
-                    reserve(self.query.bytes_of_part(self.representation, size, reached))
+                    reserve(self.query.bytes_of_part(size, reached))
         finally:
             for each in running:
                 each.cancel()
@@ -107,7 +103,7 @@ class MatrixInParts:
         await self.results.index(name)  # another service may have computed it
         result = await self.results.find(name)
         if result is None:
-            work = ComputePart(self.query, self.representation.dtype, part, name)
+            work = ComputePart(self.query, part, name)
             done = await self.engine.run(self._task(work), partial(note, part))
             assert done.result is not None, "this kind of work answers"  # noqa: S101
             self._seconds += done.seconds["compute"]

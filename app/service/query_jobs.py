@@ -12,10 +12,9 @@ from app.encoding import Representation
 from app.engine.interface import ProgressCallback
 from app.errors import ProblemError, problem, problem_of
 from app.jobs import Job, JobManager, JobSpec
-from app.queries import KINDS, MeshSize, Query, fingerprint
+from app.queries import KINDS, MatrixQuery, MeshSize, Query, fingerprint
 from app.service.answering import Answered, Answering
 from app.service.progress import LatestProgress
-from app.service.question import Question
 from app.service.request_context import RequestContext
 from app.service.time_limit import time_limit
 from app.settings import Settings
@@ -44,7 +43,7 @@ class _Begun:
 
 
 class QueryJobs:
-    """Makes jobs of questions, and computes their answers, again after a restart."""
+    """Makes jobs of queries, and computes their answers, again after a restart."""
 
     def __init__(
         self,
@@ -63,41 +62,45 @@ class QueryJobs:
         self._size_of = size_of
         self._reading = CapacityLimiter(1)
 
-    async def submit(self, question: Question, context: RequestContext, key: str | None) -> Job:
-        """Accept a job that answers a question, or return the job with the idempotency key."""
-        query = question.query
-        query.check_answer(question.representation, question.size, self._settings, as_job=True)
-        self._answering.engine.refuse_when_full(question.client)
+    async def submit(self, query: Query[Any], context: RequestContext, key: str | None) -> Job:
+        """Accept a job that answers a query, or return the job with the idempotency key."""
+        query.check_answer(self._settings, as_job=True)
+        self._answering.engine.refuse_when_full(context.caller.name)
+        self._results.refuse_without_room(context.caller.owner, self._room(query))
 
         async def solve(on_progress: ProgressCallback) -> Result:
-            return await self._patiently(partial(self._promised, question, on_progress))
+            promised = partial(
+                self._promised, query, context.caller.name, context.caller.owner, on_progress
+            )
+            return await self._patiently(promised)
 
-        return await self._jobs.submit(_spec_of(question, context, key), query.written, solve)
+        return await self._jobs.submit(_spec_of(query, context, key), query.written, solve)
 
     async def answer_or_submit(
         self,
-        question: Question,
+        query: Query[Any],
         context: RequestContext,
         wait_s: float,
         key: str | None,
         *,
         as_file: bool,
     ) -> Answered | Job:
-        """Answer a question, by a job if that takes longer than the wait.
+        """Answer a query, by a job if that takes longer than the wait.
 
         The job goes on with the work that was begun.
         """
-        self._answering.engine.refuse_when_full(question.client)
+        client = context.caller.name
+        self._answering.engine.refuse_when_full(client)
         progress = LatestProgress()
         answering = asyncio.create_task(
-            self._answering.find_or_compute(question, progress, is_promised=True)
+            self._answering.find_or_compute(query, client, progress, is_promised=True)
         )
         begun = _Begun(answering)
 
         async def attempt() -> Result:
             first = begun.take()
             if first is None:
-                return await self._promised(question, progress)
+                return await self._promised(query, client, context.caller.owner, progress)
             result, _ = await first
             return await self._results.with_files(result)
 
@@ -108,8 +111,9 @@ class QueryJobs:
         try:
             await asyncio.wait({answering}, timeout=min(wait_s, context.deadline_s))
             if not answering.done():
-                spec = _spec_of(question, context, key)
-                job = await self._jobs.submit(spec, question.query.written, solve)
+                self._results.refuse_without_room(context.caller.owner, self._room(query))
+                spec = _spec_of(query, context, key)
+                job = await self._jobs.submit(spec, query.written, solve)
                 if job.spec is not spec:  # an earlier one with the same idempotency key
                     self._abandon(begun)
                 return job
@@ -143,8 +147,8 @@ class QueryJobs:
                 query = await to_thread.run_sync(
                     self._stored_query, spec, size, written, limiter=self._reading
                 )
-                question = Question(query, size, representation, spec.client)
-                return await self._promised(question, on_progress)
+                query = query.answered_as(representation)
+                return await self._promised(query, spec.client, spec.owner, on_progress)
 
         return await self._patiently(attempt)
 
@@ -160,10 +164,21 @@ class QueryJobs:
                     logger.warning("job waits, since the store does not answer", error=str(error))
                 await asyncio.sleep(_STORE_PAUSE_S)
 
-    async def _promised(self, question: Question, on_progress: ProgressCallback) -> Result:
-        """Answer the question of a job, with files."""
-        result, _ = await self._answering.find_or_compute(question, on_progress, is_promised=True)
-        return await self._results.with_files(result)
+    async def _promised(
+        self, query: Query[Any], client: str, owner: str | None, on_progress: ProgressCallback
+    ) -> Result:
+        """Answer the query of a job, with files, for which room is reserved before."""
+        with self._results.reserving(owner, self._room(query)):
+            result, _ = await self._answering.find_or_compute(
+                query, client, on_progress, is_promised=True
+            )
+            return await self._results.with_files(result)
+
+    def _room(self, query: Query[Any]) -> int:
+        """Return the bytes to reserve for an answer; a matrix in parts reserves its own."""
+        if isinstance(query, MatrixQuery) and query.is_in_parts(self._settings, as_job=True):
+            return 0
+        return query.rough_bytes()
 
     def _stored_query(self, spec: JobSpec, size: MeshSize, written: bytes) -> Query[Any]:
         """Return the query of a job, which an older release may have written."""
@@ -176,8 +191,8 @@ class QueryJobs:
         return kind.ask(spec.mesh_id, size, request, self._settings)
 
 
-def _spec_of(question: Question, context: RequestContext, key: str | None) -> JobSpec:
-    query, representation = question.query, question.representation
+def _spec_of(query: Query[Any], context: RequestContext, key: str | None) -> JobSpec:
+    representation = query.representation
     return JobSpec(
         owner=context.caller.owner,
         kind=query.kind,
@@ -186,7 +201,7 @@ def _spec_of(question: Question, context: RequestContext, key: str | None) -> Jo
         dtype=representation.dtype,
         coding=representation.coding,
         client=context.caller.name,
-        fingerprint=fingerprint(query, representation),
+        fingerprint=fingerprint(query),
         idempotency_key=key,
         request_id=context.request_id,
     )

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Iterator, Mapping
-from contextlib import asynccontextmanager, contextmanager, suppress
+from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from gc import collect, freeze
 from pathlib import Path
@@ -34,8 +34,10 @@ from app.store.choice import store_of
 from app.store.fields import FieldStore
 from app.store.interface import Store
 from app.store.mesh_catalog import MeshCatalog
+from app.store.mesh_index import MeshIndex
 from app.store.ownership import Share
 from app.store.results import ResultStore
+from app.store.scratch import Scratch
 
 _CATALOG_PERIOD_S = 2.0
 """Seconds between two looks at what other services did to meshes, where they are shared"""
@@ -59,16 +61,20 @@ class Service:
         self.settings = settings
         self.database = _database_of(settings)
         self.store = store_of(settings)
+        self.scratch = Scratch(settings.folder, settings.scratch_bytes)
         self.mesh_catalog = MeshCatalog(
-            settings.folder,
             self.store.meshes,
             settings.store_bytes,
             evicts=settings.store_evict == "lru",
             quota=settings.quota_bytes,
             shared=MeshRecords(self.database) if self.database.is_shared else None,
         )
+        self.mesh_index = MeshIndex(self.store.meshes)
         self.results = ResultStore(
-            self.store.results, settings.results_bytes, settings.results_memory_bytes
+            self.store.results,
+            settings.results_bytes,
+            settings.results_memory_bytes,
+            settings.quota_results_bytes,
         )
         self.fields = FieldStore(settings.folder, settings.fields_bytes)
         self.engine = _engine(settings, self.store)
@@ -105,7 +111,8 @@ class Service:
         share_arenas()
         with self.owning_store() as share:
             is_alone = share is None or share.is_first
-            self.mesh_catalog.prepare(is_alone=is_alone)
+            self.scratch.prepare(is_alone=is_alone)
+            self.mesh_catalog.prepare()
             self.results.prepare(is_alone=is_alone)
             if is_alone:
                 self.fields.prepare(self.mesh_catalog.ids)
@@ -184,10 +191,10 @@ class Service:
     ) -> StoredMesh:
         """Have a worker read or make a mesh, and store it under a name, if it has one."""
         async with (
-            self.mesh_catalog.scratch_folder() as scratch,
+            self.scratch.folder(context.caller.name) as scratch,
             time_limit(self.settings, context.deadline_s),
         ):
-            work = StoreMesh(mesh_input, scratch / "mesh", context.caller.owner, name)
+            work = StoreMesh(mesh_input, scratch.path / "mesh", context.caller.owner, name)
             task = Task(work, context.caller.name)
             while True:
                 done = await self.engine.run(task, ignore_progress)
@@ -213,21 +220,9 @@ class Service:
         return await self.store.meshes.array_file(mesh_id, name)
 
     async def size(self, mesh_id: str) -> MeshSize:
-        """Return the counts of a mesh that checks and estimates need."""
+        """Return the counts of a mesh that checks need."""
         report = (await self.store.meshes.manifest(mesh_id))["report"]
         return MeshSize(report["vertices"], report["faces"], report["mean_edge_length"])
-
-    async def list_meshes(self, limit: int, after: str) -> tuple[list[Manifest], str | None]:
-        """Return the manifests of ``limit`` meshes after an id, and the id to go on after."""
-        ids, more = await self.store.meshes.page(after, limit)
-        found = await asyncio.gather(*map(self._manifest_if_any, ids))
-        return [each for each in found if each is not None], ids[-1] if more else None
-
-    async def _manifest_if_any(self, mesh_id: str) -> Manifest | None:
-        # Left out: meshes deleted meanwhile, and damaged ones. Reading those alone says why.
-        with suppress(ProblemError):
-            return await self.store.meshes.manifest(mesh_id)
-        return None
 
     async def delete_mesh(self, mesh_id: str, caller: Caller) -> None:
         """Remove a mesh and its results; afterwards no service that shares the store has it."""

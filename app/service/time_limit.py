@@ -5,7 +5,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 from app.errors import problem
-from app.settings import Settings, variable_of
+from app.settings import Settings
 
 
 @asynccontextmanager
@@ -26,5 +26,5 @@ async def time_limit(
             "deadline_exceeded",
             detail,
             limit=seconds,
-            setting=variable_of(setting) if is_ours else None,
+            setting=setting if is_ours else None,
         ) from None

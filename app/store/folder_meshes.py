@@ -2,7 +2,7 @@
 
 import asyncio
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -44,9 +44,13 @@ class FolderMeshes:
         """Return the manifest of a mesh, which is read once."""
         return self._store.manifest(mesh_id)
 
-    async def page(self, after: str, limit: int) -> tuple[Sequence[str], bool]:
+    async def ids(self) -> Collection[str]:
         """List the folder."""
-        return await to_thread.run_sync(self._store.page, after, limit)
+        return await to_thread.run_sync(self._store.ids)
+
+    async def manifests(self, ids: Iterable[str]) -> Sequence[Mapping[str, Any]]:
+        """Read the manifests in a thread: there may be thousands."""
+        return await to_thread.run_sync(self._store.manifests, ids)
 
     async def array_file(self, mesh_id: str, name: str) -> Path:
         """Return the file itself."""

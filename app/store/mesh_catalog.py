@@ -2,24 +2,18 @@
 
 One process knows it, or the catalogs of several services share a table. Their home is the source of
 truth: a folder, or an object store. Each change there is made together with its entry here: a crash
-leaves a mesh either there or not, and the next start counts anew. Workers write new meshes into a
-scratch folder, which is removed with everything left in it. The files of a damaged mesh are
+leaves a mesh either there or not, and the next start counts anew. The files of a damaged mesh are
 replaced: until the last one is there, it is still damaged.
 """
 
 import asyncio
-import shutil
-import tempfile
 from collections import Counter, OrderedDict
 from collections.abc import AsyncIterator, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Protocol
-from uuid import uuid4
 
 from app.errors import ProblemError, over_limit
-from app.store.layout import TEMPORARY
 from app.store.mesh_home import MeshHome, MeshRecord
 from app.store.meshes import WrittenMesh, mesh_not_found
 
@@ -70,7 +64,6 @@ class MeshCatalog:
 
     def __init__(
         self,
-        root: Path,
         home: MeshHome,
         capacity: int,
         *,
@@ -83,7 +76,6 @@ class MeshCatalog:
         self._shared = shared
         self._used: dict[str, None] = {}
         """Meshes used since the shared table was told, the last one last"""
-        self._temporary = root / TEMPORARY
         self._capacity = capacity
         self._evicts = evicts
         self._quota = quota
@@ -92,14 +84,8 @@ class MeshCatalog:
         self.evictions = 0
         """Meshes removed so far to make room"""
 
-    def prepare(self, *, is_alone: bool = True) -> None:
-        """Remove what a former service left unfinished, and measure the meshes.
-
-        Another service may be writing it, where this one is not alone.
-        """
-        self._temporary.mkdir(exist_ok=True)
-        if is_alone:
-            _remove(*self._temporary.iterdir())
+    def prepare(self) -> None:
+        """Measure the meshes."""
         self._entries = OrderedDict(self._home.found())
 
     async def reconcile(self) -> None:
@@ -166,21 +152,6 @@ class MeshCatalog:
     def total(self) -> int:
         """Bytes of all meshes."""
         return sum(entry.size for entry in self._entries.values())
-
-    @asynccontextmanager
-    async def scratch_folder(self) -> AsyncIterator[Path]:
-        """Lend an empty folder on the store's disk, and remove it after the block."""
-        folder = Path(tempfile.mkdtemp(dir=self._temporary))
-        try:
-            yield folder
-        finally:
-            # Rename first: then a worker that is about to be killed can no longer write into it.
-            gone = self._new_name()
-            try:
-                folder.rename(gone)
-            except OSError:  # the disk has no room for another name
-                gone = folder
-            await asyncio.to_thread(_remove, gone)
 
     async def add(self, written: WrittenMesh) -> CatalogChange | None:
         """Move a mesh from its scratch folder into the store; if it is there, mark it as used.
@@ -310,14 +281,3 @@ class MeshCatalog:
     async def _remove(self, mesh_id: str) -> None:
         await self._home.remove(mesh_id)
         del self._entries[mesh_id]
-
-    def _new_name(self) -> Path:
-        return self._temporary / f"{uuid4().hex}.gone"
-
-
-def _remove(*entries: Path) -> None:
-    for entry in entries:
-        if entry.is_dir():
-            shutil.rmtree(entry, ignore_errors=True)
-        else:
-            entry.unlink(missing_ok=True)

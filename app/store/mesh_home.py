@@ -1,6 +1,6 @@
 """The interface to where the meshes of a service are."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -35,8 +35,11 @@ class MeshHome(Protocol):
     async def manifest(self, mesh_id: str) -> Mapping[str, Any]:
         """Return the manifest of a mesh; raises ``ProblemError`` where there is none."""
 
-    async def page(self, after: str, limit: int) -> tuple[Sequence[str], bool]:
-        """Return the next ``limit`` ids after ``after``, in order, and whether more follow."""
+    async def ids(self) -> Collection[str]:
+        """Return the ids of all meshes."""
+
+    async def manifests(self, ids: Iterable[str]) -> Sequence[Mapping[str, Any]]:
+        """Return the manifests of meshes, in their order, without those that cannot be read."""
 
     async def array_file(self, mesh_id: str, name: str) -> Path:
         """Return the file of an array that clients may read, after verifying it."""

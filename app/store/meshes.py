@@ -18,8 +18,7 @@ import hashlib
 import os
 import re
 import zlib
-from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -106,12 +105,18 @@ class MeshStore:
         self.folder = root / MESHES
 
     def write_aside(
-        self, mesh: TriangleMesh, folder: Path, owner: str | None, name: str | None = None
+        self,
+        mesh: TriangleMesh,
+        folder: Path,
+        owner: str | None,
+        name: str | None = None,
+        check: Callable[[], None] = lambda: None,
     ) -> WrittenMesh:
         """Write ``mesh`` into a new scratch ``folder``, unless it is intact in the store.
 
         A mesh in the store belongs to the ``owner`` that stored it first, and keeps the ``name``
-        that it got then, as far as its manifest still tells.
+        that it got then, as far as its manifest still tells. Before each array ``check`` is called;
+        it may raise.
         """
         arrays = mesh.arrays()
         mesh_id = content_hash(arrays)
@@ -119,16 +124,18 @@ class MeshStore:
             if self.is_intact(mesh_id):
                 return WrittenMesh(self.manifest(mesh_id), folder=None)
         folder.mkdir()
+        checksums = {}
+        for array_name, array in arrays.items():
+            check()
+            checksums[array_name] = _write_array(folder / f"{array_name}.npy", array)
         manifest = {
             "id": mesh_id,
             "owner": owner,
             "name": name,
-            "created": datetime.now(UTC).isoformat(timespec="seconds"),
+            "created": datetime.now(UTC).isoformat(timespec="milliseconds"),
             "report": mesh.report.as_dict(),
             "warnings": list(mesh.warnings),
-            "crc32": {
-                name: _write_array(folder / f"{name}.npy", array) for name, array in arrays.items()
-            },
+            "crc32": checksums,
         }
         with suppress(ProblemError):  # there is no such mesh, or its manifest is damaged
             stored = self.manifest(mesh_id)
@@ -261,11 +268,17 @@ class MeshStore:
             raise problem("not_found", detail)
         return self._verified(mesh_id, PUBLIC_ARRAYS[name])
 
-    def page(self, after: str, limit: int) -> tuple[list[str], bool]:
-        """Return the next ``limit`` ids after ``after``, in order, and whether more follow."""
-        ids = sorted(entry.name for entry in self.folder.iterdir())
-        first = bisect_right(ids, after)
-        return ids[first : first + limit], len(ids) > first + limit
+    def ids(self) -> list[str]:
+        """Return the ids of all meshes."""
+        return [entry.name for entry in self.folder.iterdir()]
+
+    def manifests(self, ids: Iterable[str]) -> list[Mapping[str, Any]]:
+        """Return the manifests of meshes, in their order, without those that cannot be read."""
+        found = []
+        for mesh_id in ids:
+            with suppress(ProblemError):
+                found.append(self.manifest(mesh_id))
+        return found
 
     def sizes(self) -> dict[str, int]:
         """Return the bytes of each mesh on disk, the least recently used first."""

@@ -8,9 +8,8 @@ none in use. The manifest in the store tells whether a copy is still that mesh.
 import asyncio
 import shutil
 import tempfile
-from bisect import bisect_right
 from collections import Counter
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Collection, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
@@ -101,11 +100,18 @@ class ObjectMeshes:
         """Return the manifest of a mesh, as it was in the store less than a second ago."""
         return (await self._current(mesh_id)).manifest
 
-    async def page(self, after: str, limit: int) -> tuple[Sequence[str], bool]:
+    async def ids(self) -> Collection[str]:
         """List the store."""
-        ids = await self._call(self._objects.folders, MESHES)
-        first = bisect_right(ids, after)
-        return ids[first : first + limit], len(ids) > first + limit
+        ids: Collection[str] = await self._call(self._objects.folders, MESHES)
+        return ids
+
+    async def manifests(self, ids: Iterable[str]) -> Sequence[Mapping[str, Any]]:
+        """Ask for the manifests, as many at a time as there are calls."""
+        found = await asyncio.gather(*map(self.manifest, ids), return_exceptions=True)
+        for error in found:
+            if isinstance(error, BaseException) and not isinstance(error, ProblemError):
+                raise error
+        return [each for each in found if not isinstance(each, BaseException)]
 
     async def array_file(self, mesh_id: str, name: str) -> Path:
         """Pull the mesh, and return the file of the copy."""

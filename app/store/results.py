@@ -8,7 +8,7 @@ on it.
 
 import errno
 import zlib
-from collections import Counter, OrderedDict
+from collections import Counter, OrderedDict, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -19,8 +19,7 @@ from typing import IO, Protocol
 from anyio import to_thread
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from app.errors import StoreUnavailableError, problem
-from app.settings import variable_of
+from app.errors import StoreUnavailableError, over_limit, problem
 from app.store.atomic import atomic_write, remove_partial
 from app.store.last_use import note_use, order_of_use
 from app.store.log import warn
@@ -37,6 +36,9 @@ _CHUNK = 2**20
 
 _ENTRY = 4096
 """Bytes that a result in memory takes besides its body: objects, names and headers"""
+
+
+_MAKE_ROOM = "delete jobs whose answers you have read"
 
 
 class ResultManifest(BaseModel):
@@ -268,22 +270,28 @@ class FolderResults:
 class ResultStore:
     """Results in ``files``, at most ``capacity`` bytes; the least recently used go first.
 
-    Small results of up to ``memory`` bytes are held in memory: all those without files, and some
-    of the others. One process owns the store and its index. `find` and `add` acquire a result,
-    which protects its files until `release`; a pinned one stays until `unpin`.
+    Those that the jobs of one owner pin, or reserve room for, have at most ``quota`` bytes. Small
+    results of up to ``memory`` bytes are held in memory: all those without files, and some of the
+    others. One process owns the store and its index. `find` and `add` acquire a result, which
+    protects its files until `release`; a pinned one stays until `unpin`.
     """
 
-    def __init__(self, files: ResultFiles, capacity: int, memory: int) -> None:
+    def __init__(
+        self, files: ResultFiles, capacity: int, memory: int, quota: int | None = None
+    ) -> None:
         self._files = files
         self._capacity = capacity
+        self._quota = quota
         self._memory = memory
         self._small: OrderedDict[str, Result] = OrderedDict()
         self._small_total = 0
         self._sizes: OrderedDict[str, int] = OrderedDict()
         self._total = 0
         self._in_use: Counter[str] = Counter()
-        self._pins: Counter[str] = Counter()
-        self._reserved = 0
+        self._pins: defaultdict[str | None, Counter[str]] = defaultdict(Counter)
+        """Numbers of pins on results, by owner"""
+        self._reserved: Counter[str | None] = Counter()
+        """Bytes by owner"""
         self.evictions = 0
         """Results removed so far to make room on the disk"""
         self.memory_evictions = 0
@@ -352,7 +360,7 @@ class ResultStore:
     def release(self, result: Result) -> None:
         """End the use of a result that was acquired."""
         self._decrement_use(result.name)
-        if not result.is_reusable and result.name not in self._pins:
+        if not result.is_reusable and result.name not in self._pinned:
             self._remove(result.name)
         self.make_room()
 
@@ -377,8 +385,8 @@ class ResultStore:
         return filed
 
     @contextmanager
-    def reserving(self, nbytes: int) -> Iterator[Callable[[int], None]]:
-        """Reserve room for results that are made, in several steps, inside the block.
+    def reserving(self, owner: str | None, nbytes: int) -> Iterator[Callable[[int], None]]:
+        """Reserve room for results that an owner's job makes inside the block.
 
         Yields a function that reserves more. Raises ``ProblemError`` where the results of jobs,
         and other reservations, leave too little.
@@ -387,19 +395,32 @@ class ResultStore:
 
         def reserve(nbytes: int) -> None:
             nonlocal reserved
-            self.refuse_without_room(nbytes)
-            self._reserved += nbytes
+            self.refuse_without_room(owner, nbytes)
+            self._reserved[owner] += nbytes
             reserved += nbytes
 
         reserve(nbytes)
         try:
             yield reserve
         finally:
-            self._reserved -= reserved
+            self._reserved[owner] -= reserved
+            if not self._reserved[owner]:
+                del self._reserved[owner]
 
-    def refuse_without_room(self, nbytes: int) -> None:
-        """Raise ``ProblemError`` where the results of jobs leave no room for so many bytes."""
-        room = self._capacity - self._reserved - self._pinned(set())
+    def refuse_without_room(self, owner: str | None, nbytes: int) -> None:
+        """Raise ``ProblemError`` where so many bytes would be too many, of the owner or of all."""
+        own = self._reserved[owner] + self._bytes_of(set(self._pins[owner])) + nbytes
+        if self._quota is not None and own > self._quota:
+            raise over_limit(
+                "quota_exceeded",
+                "bytes of answers to one owner's jobs",
+                own,
+                self._quota,
+                "quota_results_bytes",
+                hint=_MAKE_ROOM,
+                other_status=507,
+            )
+        room = self._capacity - self._reserved.total() - self._bytes_of(self._pinned)
         if nbytes > room:
             raise problem(
                 "storage_full",
@@ -407,24 +428,30 @@ class ResultStore:
                 "needs",
                 limit=self._capacity,
                 actual=self._capacity - room + nbytes,
-                setting=variable_of("results_bytes"),
-                hint="delete jobs whose answers you have read",
+                setting="results_bytes",
+                hint=_MAKE_ROOM,
             )
 
-    def can_pin(self, name: str) -> bool:
-        """Tell whether all pinned results would fit together with this one."""
-        return self._pinned({name}) + self._reserved <= self._capacity
+    @property
+    def _pinned(self) -> set[str]:
+        return set().union(*self._pins.values())
 
-    def _pinned(self, others: set[str]) -> int:
-        return sum(self._sizes.get(name, 0) for name in {*self._pins, *others})
+    def _bytes_of(self, names: set[str]) -> int:
+        return sum(self._sizes.get(name, 0) for name in names)
 
-    def pin(self, name: str) -> None:
+    def pin_within_quota(self, name: str, owner: str | None) -> None:
+        """Pin a result, or raise ``ProblemError`` as `refuse_without_room` does."""
+        if name not in self._pins[owner]:
+            self.refuse_without_room(owner, 0 if name in self._pinned else self._sizes.get(name, 0))
+        self.pin(name, owner)
+
+    def pin(self, name: str, owner: str | None) -> None:
         """Protect a result from eviction until `unpin`."""
-        self._pins[name] += 1
+        self._pins[owner][name] += 1
 
-    def unpin(self, name: str) -> None:
-        """Take one pin off a result."""
-        self._pins -= Counter([name])
+    def unpin(self, name: str, owner: str | None) -> None:
+        """Take one pin of an owner off a result."""
+        self._pins[owner] -= Counter([name])
         self.make_room()
 
     def discard(self, name: str) -> None:
@@ -457,15 +484,16 @@ class ResultStore:
         """Remove results until the rest fits, but none that is pinned or in use."""
         if self._total <= self._capacity:
             return
+        pinned = self._pinned
         for name in list(self._sizes):
-            if self._is_free(name):
+            if name not in self._in_use and name not in pinned:
                 self._remove(name)
                 self.evictions += 1
             if self._total <= self._capacity:
                 return
 
     def _is_free(self, name: str) -> bool:
-        return name not in self._in_use and name not in self._pins
+        return name not in self._in_use and name not in self._pinned
 
     def _cache_small(self, result: Result) -> None:
         if result.body is None or result.name in self._small:

@@ -2,7 +2,7 @@
 import { defineConfig } from "vite";
 
 export default defineConfig({
-  base: "/",
+  base: "./", // a proxy may offer the page below a prefix
   build: {
     target: "es2022",
     assetsInlineLimit: 0,

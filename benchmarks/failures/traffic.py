@@ -116,7 +116,7 @@ class Worker(Client):
             results = Request("getJobResults", "GET", f"{link}/results", expected=request.expected)
             if self.send(results).status_code == 200:
                 self.note_promise(kept=link)
-                self.exchange("dismissJob", "DELETE", link, 200, 404)  # or an answer went astray
+                self.exchange("deleteJob", "DELETE", link, 200, 404)  # or an answer went astray
 
     def submit(self, request: Request, headers: dict[str, str]) -> FastResponse:
         """Send a query as a job; return the answer."""

@@ -168,7 +168,7 @@ def _records() -> tuple[float, float]:
     with tempfile.TemporaryDirectory() as folder:
         store = MeshStore(Path(folder))
         home: Any = store  # nothing is asked of it
-        catalog = MeshCatalog(Path(folder), home, 2**60, evicts=False, shared=_Table(records))
+        catalog = MeshCatalog(home, 2**60, evicts=False, shared=_Table(records))
         seconds = spent(lambda: asyncio.run(catalog.keep_up()))
     return seconds / RECORDS, size / RECORDS
 

@@ -171,20 +171,20 @@ class Client(User):
         results = Request("getJobResults", "GET", f"{link}/results", expected=request.expected)
         self.send(results)
         if DICE.random() < 0.9:  # the others are removed when they have expired
-            self.exchange("dismissJob", "DELETE", link, 200)
+            self.exchange("deleteJob", "DELETE", link, 200)
             self.exchange("getJob", "GET", link, 404)
 
     @locust.task(1)
-    def dismiss(self) -> None:
+    def cancel(self) -> None:
         """Stop a job under way."""
         link = submit(self, long_query(self.plan))
         if link is None:
             return
         gevent.sleep(DICE.uniform(0, 0.2))
-        stopped = self.exchange("dismissJob", "DELETE", link, 200)
+        stopped = self.exchange("cancelJob", "POST", f"{link}/cancel", 200)
         if stopped.status_code == 200 and stopped.json()["status"] == "dismissed":
             self.exchange("getJobResults", "GET", f"{link}/results", 410)
-            self.exchange("dismissJob", "DELETE", link, 200)
+        self.exchange("deleteJob", "DELETE", link, 200)
 
     def _question(self) -> Request:
         return DICE.choice([each for each in self.plan.queries if each.method == "POST"])
@@ -286,9 +286,7 @@ class Hoarder(User):
             headers={**question.headers, **ASYNC},
         )
         for link in links:
-            ended = self.exchange("dismissJob", "DELETE", link, 200)
-            if ended.json()["status"] == "dismissed":
-                self.exchange("dismissJob", "DELETE", link, 200)
+            self.exchange("deleteJob", "DELETE", link, 200)
 
 
 def store(user: User, upload: Upload) -> bool:

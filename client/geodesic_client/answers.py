@@ -44,6 +44,19 @@ class Mesh:
 
 
 @dataclass(frozen=True)
+class ListedMesh:
+    """A mesh in a list of the store; `Client.mesh` returns the rest."""
+
+    id: str
+    name: str | None
+    """The name given with its first upload, if any"""
+    vertices: int
+    faces: int
+    created: str
+    """When it was stored, RFC 3339"""
+
+
+@dataclass(frozen=True)
 class Distances:
     """Distances of all vertices, or of the targets; infinite where they cannot be reached."""
 
@@ -74,6 +87,21 @@ class Path:
     error_bound: ErrorBound
     reason: str | None
     """``disconnected`` or ``beyond_max_distance``; None for a path"""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step of the search for a path."""
+
+    leg: int
+    """Number of the leg, from one stop to the next"""
+    name: str
+    bound: float
+    """The smallest upper bound of the leg's length that is known after the step"""
+    windows: int
+    """Windows that were created"""
+    faces: Integers
+    """The faces that were visited"""
 
 
 @dataclass(frozen=True)
@@ -135,7 +163,7 @@ class StoredMatrix:
     """A matrix that the service keeps in a file: the answer of a job.
 
     `matrix_rows` reads some rows of a dense one, `save_matrix` saves either to a file. The service
-    keeps it until the job is dismissed or expires.
+    keeps it until the job is deleted or expires.
     """
 
     job_id: str
@@ -177,15 +205,6 @@ class LocatedPoint:
 
 
 @dataclass(frozen=True)
-class Estimate:
-    """The expected cost of an answer."""
-
-    seconds: float
-    memory_bytes: int
-    response_bytes: int
-
-
-@dataclass(frozen=True)
 class Job:
     """A query that is answered in the background."""
 
@@ -213,17 +232,16 @@ def to_mesh(document: Mapping[str, Any]) -> Mesh:
     return Mesh(**members, report=document)
 
 
+def to_listed_mesh(document: Mapping[str, Any]) -> ListedMesh:
+    """Return a mesh of a list."""
+    names = ("id", "name", "vertices", "faces", "created")
+    return ListedMesh(*(document[name] for name in names))
+
+
 def to_job(document: Mapping[str, Any]) -> Job:
     """Return a job, from its document."""
     names = ("id", "kind", "mesh_id", "status", "progress")
     return Job(*(document[name] for name in names))
-
-
-def to_estimate(response: httpx2.Response) -> Estimate:
-    """Return an estimate."""
-    names = ("seconds", "memory_bytes", "response_bytes")
-    document = response.json()
-    return Estimate(*(document[name] for name in names))
 
 
 def to_distances(response: httpx2.Response) -> Distances:
@@ -266,6 +284,14 @@ def _to_path(document: Mapping[str, Any]) -> Path:
         error_bound=ErrorBound(**document["error_bound"]),
         reason=document.get("reason"),
     )
+
+
+def to_steps(response: httpx2.Response) -> list[Step]:
+    """Return the steps of a search."""
+    return [
+        Step(**{**each, "faces": np.array(each["faces"], np.int64)})
+        for each in response.json()["steps"]
+    ]
 
 
 def to_isolines(response: httpx2.Response) -> Isolines:

@@ -102,7 +102,7 @@ def unreachable(error: httpx2.TransportError) -> UnreachableError:
 
     If the connection broke, the service may have received the request. It may be sent again all the
     same: meshes are named by their content, jobs by a key, and queries change nothing. But a second
-    ``DELETE`` would find nothing, or remove a job that the first one only stopped.
+    ``DELETE`` would find nothing.
     """
     repeatable = _UNSENT if error.request.method == "DELETE" else (*_UNSENT, *_BROKEN)
     message = f"no answer from {error.request.url}: {error or type(error).__name__}"

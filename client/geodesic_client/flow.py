@@ -109,12 +109,9 @@ def end_of(job: Job, progress: Progress) -> Flow[None]:
 
 
 def remove(job: Job) -> Flow[None]:
-    """Remove a job, if the service can do so now; stop it first if it has not finished."""
-    request = Request("DELETE", _link(job), is_optional=True)
+    """Remove a job, if the service can do so now; that stops it as well."""
     with suppress(GeodesicClientError):
-        last = to_job((yield from send(request)).json())
-        if last.status == "dismissed":  # it has only been stopped
-            yield from send(request)
+        yield from send(Request("DELETE", _link(job), is_optional=True))
 
 
 def _link(job: Job) -> str:

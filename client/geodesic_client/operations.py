@@ -19,27 +19,29 @@ from geodesic_client.answers import (
     NPZ,
     Border,
     Distances,
-    Estimate,
     Isolines,
     Job,
+    ListedMesh,
     LocatedPoint,
     Matrix,
     Mesh,
     Neighbour,
     Path,
+    Step,
     StoredMatrix,
     to_array,
     to_borders,
     to_distances,
-    to_estimate,
     to_isolines,
     to_job,
+    to_listed_mesh,
     to_located,
     to_matrix,
     to_mesh,
     to_neighbours,
     to_path,
     to_paths,
+    to_steps,
     to_stored_matrix,
 )
 from geodesic_client.flow import (
@@ -57,7 +59,17 @@ from geodesic_client.points import Point, as_points
 
 T = TypeVar("T")
 Accuracy = Literal["exact", "approximate", "fast"]
-Kind = Literal["distances", "path", "paths", "isolines", "borders", "matrix", "nearest", "locate"]
+Kind = Literal[
+    "distances",
+    "path",
+    "path/steps",
+    "paths",
+    "isolines",
+    "borders",
+    "matrix",
+    "nearest",
+    "locate",
+]
 ArrayName = Literal["vertices", "faces", "vertex_map", "face_map", "components"]
 
 _PART_BYTES = 2**23
@@ -113,9 +125,10 @@ def sample(name: str, faces: int = 20_000) -> Flow[Mesh]:
     return to_mesh((yield from send(Request("POST", "/v1/meshes", parameters))).json())
 
 
-def meshes() -> Flow[list[Mesh]]:
-    """Return all meshes in the store, by their ids."""
-    return [to_mesh(each) for each in (yield from _list("meshes"))]
+def meshes(name: str | None = None) -> Flow[list[ListedMesh]]:
+    """Return all meshes in the store, or those of a name, the newest first."""
+    parameters = {} if name is None else {"name": name}
+    return [to_listed_mesh(each) for each in (yield from _list("meshes", parameters))]
 
 
 def mesh(mesh_id: str) -> Flow[Mesh]:
@@ -193,6 +206,27 @@ def path(
         barriers=barriers,
     )
     return (yield from _ask(mesh, "path", body, to_path, progress))
+
+
+def path_steps(
+    mesh: Mesh | str,
+    source: Point,
+    target: Point,
+    *,
+    waypoints: Sequence[Point] = (),
+    max_distance: float | None = None,
+    barriers: Sequence[int] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[list[Step]]:
+    """Return the steps of the search for the exact path; none where there is no path."""
+    body = _body(
+        source=source,
+        target=target,
+        waypoints=waypoints,
+        max_distance=max_distance,
+        barriers=barriers,
+    )
+    return (yield from _ask(mesh, "path/steps", body, to_steps, progress))
 
 
 def paths(
@@ -406,12 +440,6 @@ def locate(
     return (yield from _ask(mesh, "locate", body, to_located, progress))
 
 
-def estimate(mesh: Mesh | str, kind: Kind, body: Mapping[str, Any]) -> Flow[Estimate]:
-    """Return the expected cost of a query, from its body as in the OpenAPI document."""
-    request = _request(mesh, kind, body, JSON, {"estimate": "true"})
-    return to_estimate((yield from send(request)))
-
-
 def jobs() -> Flow[list[Job]]:
     """Return all jobs of this caller, the newest first."""
     return [to_job(each) for each in (yield from _list("jobs"))]
@@ -422,10 +450,16 @@ def job(job_id: str) -> Flow[Job]:
     return to_job((yield from _read(f"/v1/jobs/{job_id}")))
 
 
-def dismiss_job(job: Job | str) -> Flow[Job]:
-    """Stop a job that waits or runs; remove one that has finished."""
+def cancel_job(job: Job | str) -> Flow[Job]:
+    """Stop a job that waits or runs; one that has finished stays, with its answer."""
     job_id = job.id if isinstance(job, Job) else job
-    return to_job((yield from send(Request("DELETE", f"/v1/jobs/{job_id}"))).json())
+    return to_job((yield from send(Request("POST", f"/v1/jobs/{job_id}/cancel"))).json())
+
+
+def delete_job(job: Job | str) -> Flow[None]:
+    """Remove a job and its answer; one that waits or runs is stopped."""
+    job_id = job.id if isinstance(job, Job) else job
+    yield from send(Request("DELETE", f"/v1/jobs/{job_id}"))
 
 
 def _part_of_result(job_id: str, begin: int, end: int) -> Flow[httpx2.Response]:
@@ -484,9 +518,11 @@ def _read(path: str) -> Flow[dict[str, Any]]:
     return document
 
 
-def _list(name: Literal["meshes", "jobs"]) -> Flow[list[dict[str, Any]]]:
+def _list(
+    name: Literal["meshes", "jobs"], only: Mapping[str, str] | None = None
+) -> Flow[list[dict[str, Any]]]:
     found: list[dict[str, Any]] = []
-    parameters: dict[str, str | int] = {"limit": _PAGE}
+    parameters: dict[str, str | int] = {"limit": _PAGE, **(only or {})}
     while True:
         part = (yield from send(Request("GET", f"/v1/{name}", dict(parameters)))).json()
         found += part[name]
@@ -507,6 +543,7 @@ class Operations:
     array = Method(array)
     distances = Method(distances)
     path = Method(path)
+    path_steps = Method(path_steps)
     paths = Method(paths)
     isolines = Method(isolines)
     borders = Method(borders)
@@ -516,7 +553,7 @@ class Operations:
     save_matrix = Method(save_matrix)
     nearest = Method(nearest)
     locate = Method(locate)
-    estimate = Method(estimate)
     jobs = Method(jobs)
     job = Method(job)
-    dismiss_job = Method(dismiss_job)
+    cancel_job = Method(cancel_job)
+    delete_job = Method(delete_job)

@@ -32,7 +32,7 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * The shortest path between two points, cacheable
+         * The shortest path between two points, as a link
          * @description Return the same as `POST`, for points written as `12`, `v12` or `f7:0.2,0.3,0.5`.
          */
         get: operations["getPath"];
@@ -42,6 +42,26 @@ export interface paths {
          * @description Return the points of the path, from source to target, and the faces it crosses.
          */
         post: operations["computePath"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/meshes/{mesh_id}/path/steps": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * The steps of the search for a path
+         * @description Return what the search does to find the exact path: the faces that each step visits.
+         */
+        post: operations["computePathSteps"];
         delete?: never;
         options?: never;
         head?: never;
@@ -184,7 +204,7 @@ export interface paths {
         };
         /**
          * List the meshes in the store
-         * @description List the reports of the meshes by id, `limit` at a time.
+         * @description List meshes, the newest first, `limit` at a time.
          */
         get: operations["listMeshes"];
         put?: never;
@@ -285,12 +305,32 @@ export interface paths {
         put?: never;
         post?: never;
         /**
-         * Stop a job, or remove one that has finished
+         * Remove a job and its answer
+         * @description Remove a job, and return its last state; one that waits or runs is stopped first.
+         */
+        delete: operations["deleteJob"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/jobs/{job_id}/cancel": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Stop a job
          * @description Stop a job that waits or runs; its state becomes `dismissed`.
          *
-         *     A job that has finished or was dismissed is removed, with its answer.
+         *     A job that has finished stays as it is, with its answer.
          */
-        delete: operations["dismissJob"];
+        post: operations["cancelJob"];
+        delete?: never;
         options?: never;
         head?: never;
         patch?: never;
@@ -484,7 +524,7 @@ export interface components {
             samples: string[];
             /**
              * Limits
-             * @description Each limit, by the environment variable that sets it
+             * @description Each limit, by its name
              */
             limits: {
                 [key: string]: number;
@@ -528,8 +568,8 @@ export interface components {
          */
         BordersAnswer: {
             /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
+             * Kind
+             * @constant
              */
             kind: "borders";
             /** Mesh Id */
@@ -639,8 +679,8 @@ export interface components {
          */
         DistancesAnswer: {
             /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
+             * Kind
+             * @constant
              */
             kind: "distances";
             /** Mesh Id */
@@ -650,8 +690,6 @@ export interface components {
              * @enum {string}
              */
             method: "exact" | "approximate" | "fast";
-            /** Exact */
-            exact: boolean;
             error_bound: components["schemas"]["ErrorBound"];
             /** Sources */
             sources: (components["schemas"]["ResolvedSource"] | components["schemas"]["ResolvedCurveSource"])[];
@@ -838,39 +876,6 @@ export interface components {
             kind: "guaranteed" | "estimated";
         };
         /**
-         * Estimate
-         * @description The expected cost of an answer, without computing it.
-         */
-        Estimate: {
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "estimate";
-            /** Mesh Id */
-            mesh_id: string;
-            /**
-             * Seconds
-             * @description Seconds on a free worker. The actual time can differ by a factor of 3 or more, depending on the mesh and the machine
-             */
-            seconds: number;
-            /**
-             * Memory Bytes
-             * @description Memory in addition to the mesh, as `GEODESIC_QUERY_MEMORY_BYTES` limits it; within a factor of 3
-             */
-            memory_bytes: number;
-            /**
-             * Response Bytes
-             * @description Size of the body before compression, within 5 %. With `max_distance`, and for paths and isolines, it assumes straight geodesics: on winding surfaces the body is several times as large
-             */
-            response_bytes: number;
-            /**
-             * Media Type
-             * @description Media type of the estimated response
-             */
-            media_type: string;
-        };
-        /**
          * FacePoint
          * @description A point of a face.
          */
@@ -947,9 +952,9 @@ export interface components {
         Health: {
             /**
              * Status
-             * @enum {string}
+             * @constant
              */
-            status: "ok" | "starting";
+            status: "ok";
         };
         /**
          * Index
@@ -1016,8 +1021,8 @@ export interface components {
          */
         IsolinesAnswer: {
             /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
+             * Kind
+             * @constant
              */
             kind: "isolines";
             /** Mesh Id */
@@ -1027,8 +1032,6 @@ export interface components {
              * @enum {string}
              */
             method: "exact" | "approximate" | "fast";
-            /** Exact */
-            exact: boolean;
             /** @description Error bound of the distance of each line */
             error_bound: components["schemas"]["ErrorBound"];
             /**
@@ -1162,7 +1165,7 @@ export interface components {
             problem?: components["schemas"]["ProblemDocument"] | null;
             /**
              * Links
-             * @description Paths of its results and events
+             * @description Paths of itself, its results and its events
              */
             links: {
                 [key: string]: string;
@@ -1179,13 +1182,35 @@ export interface components {
             next_cursor?: string | null;
         };
         /**
+         * ListedMesh
+         * @description A mesh in a list; its own address has the whole report.
+         */
+        ListedMesh: {
+            /** Id */
+            id: string;
+            /**
+             * Name
+             * @description The name given with its first upload, if any
+             */
+            name: string | null;
+            /** Vertices */
+            vertices: number;
+            /** Faces */
+            faces: number;
+            /**
+             * Created
+             * @description When the mesh was stored, RFC 3339
+             */
+            created: string;
+        };
+        /**
          * LocateAnswer
          * @description The nearest points, ``null`` for each position that is farther away than allowed.
          */
         LocateAnswer: {
             /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
+             * Kind
+             * @constant
              */
             kind: "locate";
             /** Mesh Id */
@@ -1281,8 +1306,8 @@ export interface components {
          */
         MatrixAnswer: {
             /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
+             * Kind
+             * @constant
              */
             kind: "matrix";
             /** Mesh Id */
@@ -1292,8 +1317,6 @@ export interface components {
              * @enum {string}
              */
             method: "exact" | "approximate" | "fast";
-            /** Exact */
-            exact: boolean;
             error_bound: components["schemas"]["ErrorBound"];
             /**
              * Layout
@@ -1551,11 +1574,11 @@ export interface components {
         };
         /**
          * MeshList
-         * @description A part of the meshes in the store, in the order of their ids.
+         * @description A part of the meshes in the store, the newest first.
          */
         MeshList: {
             /** Meshes */
-            meshes: components["schemas"]["MeshDocument"][];
+            meshes: components["schemas"]["ListedMesh"][];
             /** Next Cursor */
             next_cursor?: string | null;
         };
@@ -1565,8 +1588,8 @@ export interface components {
          */
         NearestAnswer: {
             /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
+             * Kind
+             * @constant
              */
             kind: "nearest";
             /** Mesh Id */
@@ -1576,8 +1599,6 @@ export interface components {
              * @enum {string}
              */
             method: "exact" | "approximate" | "fast";
-            /** Exact */
-            exact: boolean;
             error_bound: components["schemas"]["ErrorBound"];
             source: components["schemas"]["ResolvedPoint"];
             /**
@@ -1703,8 +1724,8 @@ export interface components {
             faces: number[] | null;
             error_bound: components["schemas"]["ErrorBound"];
             /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
+             * Kind
+             * @constant
              */
             kind: "path";
             /** Mesh Id */
@@ -1714,17 +1735,10 @@ export interface components {
              * @enum {string}
              */
             method: "exact" | "approximate" | "fast";
-            /** Exact */
-            exact: boolean;
             source: components["schemas"]["ResolvedPoint"];
             target: components["schemas"]["ResolvedPoint"];
             /** Waypoints */
             waypoints: components["schemas"]["ResolvedPoint"][];
-            /**
-             * Steps
-             * @description Steps of the search, leg by leg, with `explain`
-             */
-            steps?: components["schemas"]["SearchStep"][] | null;
             /** Warnings */
             warnings: string[];
         };
@@ -1763,6 +1777,20 @@ export interface components {
              *     ]
              */
             barriers?: number[];
+            /** Source */
+            source: number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"];
+            /** Target */
+            target: number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"];
+            /**
+             * Waypoints
+             * @description The path is shortest from each stop to the next; for `exact` only. Default: `[]`
+             */
+            waypoints?: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[];
+            /**
+             * Max Distance
+             * @description Longest path to look for, past all waypoints, in mesh units
+             */
+            max_distance?: number | null;
             /**
              * Method
              * @description `approximate`: within an allowed error; `fast`: in one quick pass, with an estimate of the error. Default: `exact`
@@ -1784,25 +1812,6 @@ export interface components {
              * @description For `fast`: more effort takes more time and lowers the error; 2 by default
              */
             effort?: (1 | 2 | 4 | 8) | null;
-            /** Source */
-            source: number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"];
-            /** Target */
-            target: number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"];
-            /**
-             * Waypoints
-             * @description The path is shortest from each stop to the next; for `exact` only. Default: `[]`
-             */
-            waypoints?: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[];
-            /**
-             * Max Distance
-             * @description Longest path to look for, past all waypoints, in mesh units
-             */
-            max_distance?: number | null;
-            /**
-             * Explain
-             * @description Add `steps`, an account of each step of the search; for `exact` and JSON only. Such an answer is not cached, since it contains timings. Default: `false`
-             */
-            explain?: boolean;
         };
         /**
          * PathTo
@@ -1843,8 +1852,8 @@ export interface components {
          */
         PathsAnswer: {
             /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
+             * Kind
+             * @constant
              */
             kind: "paths";
             /** Mesh Id */
@@ -1854,8 +1863,6 @@ export interface components {
              * @enum {string}
              */
             method: "exact" | "approximate" | "fast";
-            /** Exact */
-            exact: boolean;
             /** Source */
             source: components["schemas"]["ResolvedPoint"] | components["schemas"]["ResolvedCurve"];
             /** Paths */
@@ -2024,7 +2031,10 @@ export interface components {
             limit?: number | null;
             /** Actual */
             actual?: number | null;
-            /** Setting */
+            /**
+             * Setting
+             * @description The limit, as in `limits` of `/v1`
+             */
             setting?: string | null;
             /** Hint */
             hint?: string | null;
@@ -2139,8 +2149,6 @@ export interface components {
              * @enum {string}
              */
             name: "dijkstra" | "shorten" | "approximate" | "backtrace" | "exact" | "path";
-            /** Seconds */
-            seconds: number;
             /**
              * Bound
              * @description The smallest upper bound of the leg's length that is known after the step; after `exact`, the length
@@ -2156,6 +2164,76 @@ export interface components {
              * @description The faces that were visited
              */
             faces: number[];
+        };
+        /**
+         * StepsAnswer
+         * @description The steps of the search for a path.
+         */
+        StepsAnswer: {
+            /**
+             * Kind
+             * @constant
+             */
+            kind: "steps";
+            /** Mesh Id */
+            mesh_id: string;
+            /**
+             * Steps
+             * @description Leg by leg; empty where there is no path
+             */
+            steps: components["schemas"]["SearchStep"][];
+            /** Warnings */
+            warnings: string[];
+        };
+        /**
+         * StepsRequest
+         * @description The steps of the search for the exact path.
+         * @example {
+         *       "source": {
+         *         "vertex": 0
+         *       },
+         *       "target": {
+         *         "vertex": 99
+         *       }
+         *     }
+         * @example {
+         *       "source": {
+         *         "vertex": 0
+         *       },
+         *       "target": {
+         *         "vertex": 99
+         *       },
+         *       "waypoints": [
+         *         {
+         *           "vertex": 7
+         *         }
+         *       ]
+         *     }
+         */
+        StepsRequest: {
+            /**
+             * Barriers
+             * @description Indices of blocked faces. They act as holes, and paths may bend at their corners. Default: `[]`
+             * @example [
+             *       7,
+             *       8
+             *     ]
+             */
+            barriers?: number[];
+            /** Source */
+            source: number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"];
+            /** Target */
+            target: number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"];
+            /**
+             * Waypoints
+             * @description The path is shortest from each stop to the next; for `exact` only. Default: `[]`
+             */
+            waypoints?: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[];
+            /**
+             * Max Distance
+             * @description Longest path to look for, past all waypoints, in mesh units
+             */
+            max_distance?: number | null;
         };
         /**
          * Unreachable
@@ -2197,81 +2275,45 @@ export interface components {
             vertex: number;
         };
         /**
-         * Feature
-         * @description A line or a point with its properties.
-         */
-        Feature: {
-            /**
-             * Type
-             * @constant
-             */
-            type: "Feature";
-            /**
-             * Geometry
-             * @description `null` where there is no path, no line or no point
-             */
-            geometry: components["schemas"]["LineString"] | components["schemas"]["PointGeometry"] | null;
-            /** Properties */
-            properties: {
-                [key: string]: unknown;
-            };
-        };
-        /**
-         * FeatureCollection
-         * @description Lines or points, in the order of the JSON answer, and the other members of that answer.
-         */
-        FeatureCollection: {
-            /**
-             * Type
-             * @constant
-             */
-            type: "FeatureCollection";
-            /** Units */
-            units: string;
-            /** Features */
-            features: components["schemas"]["Feature"][];
-        };
-        /**
-         * LineString
-         * @description A line: a path, an isoline, or a border.
-         */
-        LineString: {
-            /**
-             * Type
-             * @constant
-             */
-            type: "LineString";
-            /** Coordinates */
-            coordinates: [
-                number,
-                number,
-                number
-            ][];
-        };
-        /**
-         * PointGeometry
-         * @description A point.
-         */
-        PointGeometry: {
-            /**
-             * Type
-             * @constant
-             */
-            type: "Point";
-            /** Coordinates */
-            coordinates: [
-                number,
-                number,
-                number
-            ];
-        };
-        /**
          * JobEvents
          * @description Server-sent events. The `id` of each counts the states of the job, and its `data` is a `JobDocument` in JSON. Comments between them keep the connection open.
          */
         JobEvents: string;
     };
-    responses: never;
+    responses: {
+        /** @description A problem */
+        Problem: {
+            headers: {
+                "X-Request-ID": components["headers"]["X-Request-ID"];
+                [name: string]: unknown;
+            };
+            content: {
+                "application/problem+json": components["schemas"]["ProblemDocument"];
+            };
+        };
+        /** @description A problem that will pass */
+        ProblemForNow: {
+            headers: {
+                "X-Request-ID": components["headers"]["X-Request-ID"];
+                "Retry-After": components["headers"]["Retry-After"];
+                [name: string]: unknown;
+            };
+            content: {
+                "application/problem+json": components["schemas"]["ProblemDocument"];
+            };
+        };
+        /** @description A key is missing or wrong */
+        Unauthorized: {
+            headers: {
+                "X-Request-ID": components["headers"]["X-Request-ID"];
+                "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
+                [name: string]: unknown;
+            };
+            content: {
+                "application/problem+json": components["schemas"]["ProblemDocument"];
+            };
+        };
+    };
     parameters: never;
     requestBodies: never;
     headers: {
@@ -2312,18 +2354,16 @@ export interface operations {
         parameters: {
             query?: {
                 /** @description Overrides `Accept` */
-                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv" | "svg" | "geojson";
+                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv";
                 /** @description Type of the numbers in `npy`, `npz` and `octets` */
                 dtype?: "float64" | "float32";
-                /** @description Do not compute; answer with an `Estimate` of the cost, in JSON */
-                estimate?: boolean;
             };
             header?: {
                 /** @description The longest time that the client waits, in milliseconds; it bounds no job */
                 "x-timeout-ms"?: number;
                 /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
-                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job */
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job. With `Prefer: respond-async` only */
                 "idempotency-key"?: string;
                 /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
                 Range?: string;
@@ -2354,7 +2394,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["DistancesAnswer"] | components["schemas"]["Estimate"];
+                    "application/json": components["schemas"]["DistancesAnswer"];
                     "application/x-npy": string;
                     "application/octet-stream": string;
                     "text/csv": string;
@@ -2395,97 +2435,24 @@ export interface operations {
                     "model/ply": string;
                 };
             };
-            /** @description malformed_body, malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            /** @description malformed_body, idempotency_key_unused, malformed_request */
+            400: components["responses"]["Problem"];
             /** @description unauthorized */
-            401: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            401: components["responses"]["Unauthorized"];
             /** @description origin_not_allowed */
-            403: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            403: components["responses"]["Problem"];
             /** @description mesh_not_found */
-            404: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            404: components["responses"]["Problem"];
             /** @description not_acceptable */
-            406: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            406: components["responses"]["Problem"];
             /** @description upload_too_large, result_too_large */
-            413: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            413: components["responses"]["Problem"];
             /** @description unsupported_media_type */
-            415: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            415: components["responses"]["Problem"];
             /** @description range_not_satisfiable */
-            416: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            416: components["responses"]["Problem"];
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
             422: {
                 headers: {
@@ -2497,103 +2464,39 @@ export interface operations {
                 };
             };
             /** @description quota_exceeded, rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description worker_died, mesh_damaged, internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
-            /** @description storage_full */
-            507: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
+            /** @description storage_full, quota_exceeded */
+            507: components["responses"]["Problem"];
         };
     };
     getPath: {
         parameters: {
             query: {
-                /** @description `approximate`: within an allowed error; `fast`: in one quick pass, with an estimate of the error */
-                method?: "exact" | "approximate" | "fast";
-                /** @description For `approximate`: the allowed error, as a share of the exact distance; 0.001 if neither error is given */
-                relative_error?: number;
-                /** @description For `approximate`: the allowed error in mesh units; if both errors are given, both hold */
-                absolute_error?: number;
-                /** @description For `fast`: more effort takes more time and lowers the error; 2 by default */
-                effort?: 1 | 2 | 4 | 8;
-                /** @description Overrides `Accept` */
-                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv" | "svg" | "geojson";
-                /** @description Type of the numbers in `npy`, `npz` and `octets` */
-                dtype?: "float64" | "float32";
-                /** @description Do not compute; answer with an `Estimate` of the cost, in JSON */
-                estimate?: boolean;
-                /** @description Add `steps`, an account of each step of the search */
-                explain?: boolean;
                 /** @description A vertex as `12` or `v12`, a point of the edge between two vertices as `e12-13:0.3`, of a face as `f7:0.2,0.3,0.5`, or the point nearest to a position as `p1,2,3` */
                 from: string;
                 /** @description A vertex as `12` or `v12`, a point of the edge between two vertices as `e12-13:0.3`, of a face as `f7:0.2,0.3,0.5`, or the point nearest to a position as `p1,2,3` */
                 to: string;
                 /** @description A waypoint, in the same spellings; repeat it for several, in order */
                 via?: string[];
-                /** @description Longest path to look for, past all waypoints, in mesh units */
-                max_distance?: number;
+                /** @description `approximate` within an error of 0.001, `fast` with an effort of 2 */
+                method?: "exact" | "approximate" | "fast";
+                /** @description Overrides `Accept` */
+                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv";
             };
             header?: {
                 /** @description The longest time that the client waits, in milliseconds; it bounds no job */
                 "x-timeout-ms"?: number;
                 /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
-                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job */
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job. With `Prefer: respond-async` only */
                 "idempotency-key"?: string;
                 /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
                 Range?: string;
@@ -2622,13 +2525,11 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["PathAnswer"] | components["schemas"]["Estimate"];
+                    "application/json": components["schemas"]["PathAnswer"];
                     "application/x-npy": string;
                     "application/octet-stream": string;
                     "model/obj": string;
                     "text/csv": string;
-                    "image/svg+xml": string;
-                    "application/geo+json": components["schemas"]["FeatureCollection"];
                 };
             };
             /** @description With `Prefer: respond-async`: the job */
@@ -2663,8 +2564,6 @@ export interface operations {
                     "application/octet-stream": string;
                     "model/obj": string;
                     "text/csv": string;
-                    "image/svg+xml": string;
-                    "application/geo+json": string;
                 };
             };
             /** @description The answer has not changed */
@@ -2678,169 +2577,50 @@ export interface operations {
                 };
                 content?: never;
             };
-            /** @description malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            /** @description idempotency_key_unused, malformed_request */
+            400: components["responses"]["Problem"];
             /** @description unauthorized */
-            401: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            401: components["responses"]["Unauthorized"];
             /** @description mesh_not_found */
-            404: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            404: components["responses"]["Problem"];
             /** @description not_acceptable */
-            406: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            406: components["responses"]["Problem"];
             /** @description result_too_large */
-            413: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            413: components["responses"]["Problem"];
             /** @description range_not_satisfiable */
-            416: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            416: components["responses"]["Problem"];
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
-            422: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            422: components["responses"]["Problem"];
             /** @description quota_exceeded, rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description worker_died, mesh_damaged, internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
-            /** @description storage_full */
-            507: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
+            /** @description storage_full, quota_exceeded */
+            507: components["responses"]["Problem"];
         };
     };
     computePath: {
         parameters: {
             query?: {
                 /** @description Overrides `Accept` */
-                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv" | "svg" | "geojson";
+                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv";
                 /** @description Type of the numbers in `npy`, `npz` and `octets` */
                 dtype?: "float64" | "float32";
-                /** @description Do not compute; answer with an `Estimate` of the cost, in JSON */
-                estimate?: boolean;
-                /** @description Add `steps`, an account of each step of the search */
-                explain?: boolean;
             };
             header?: {
                 /** @description The longest time that the client waits, in milliseconds; it bounds no job */
                 "x-timeout-ms"?: number;
                 /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
-                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job */
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job. With `Prefer: respond-async` only */
                 "idempotency-key"?: string;
                 /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
                 Range?: string;
@@ -2871,13 +2651,11 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["PathAnswer"] | components["schemas"]["Estimate"];
+                    "application/json": components["schemas"]["PathAnswer"];
                     "application/x-npy": string;
                     "application/octet-stream": string;
                     "model/obj": string;
                     "text/csv": string;
-                    "image/svg+xml": string;
-                    "application/geo+json": components["schemas"]["FeatureCollection"];
                 };
             };
             /** @description With `Prefer: respond-async`: the job */
@@ -2912,191 +2690,165 @@ export interface operations {
                     "application/octet-stream": string;
                     "model/obj": string;
                     "text/csv": string;
-                    "image/svg+xml": string;
-                    "application/geo+json": string;
                 };
             };
-            /** @description malformed_body, malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            /** @description malformed_body, idempotency_key_unused, malformed_request */
+            400: components["responses"]["Problem"];
             /** @description unauthorized */
-            401: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            401: components["responses"]["Unauthorized"];
             /** @description origin_not_allowed */
-            403: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            403: components["responses"]["Problem"];
             /** @description mesh_not_found */
-            404: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            404: components["responses"]["Problem"];
             /** @description not_acceptable */
-            406: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            406: components["responses"]["Problem"];
             /** @description upload_too_large, result_too_large */
-            413: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            413: components["responses"]["Problem"];
             /** @description unsupported_media_type */
-            415: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            415: components["responses"]["Problem"];
             /** @description range_not_satisfiable */
-            416: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            416: components["responses"]["Problem"];
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
-            422: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            422: components["responses"]["Problem"];
             /** @description quota_exceeded, rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description worker_died, mesh_damaged, internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
-            /** @description storage_full */
-            507: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
+            /** @description storage_full, quota_exceeded */
+            507: components["responses"]["Problem"];
         };
     };
-    computePaths: {
+    computePathSteps: {
         parameters: {
             query?: {
                 /** @description Overrides `Accept` */
-                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv" | "svg" | "geojson";
+                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv";
                 /** @description Type of the numbers in `npy`, `npz` and `octets` */
                 dtype?: "float64" | "float32";
-                /** @description Do not compute; answer with an `Estimate` of the cost, in JSON */
-                estimate?: boolean;
             };
             header?: {
                 /** @description The longest time that the client waits, in milliseconds; it bounds no job */
                 "x-timeout-ms"?: number;
                 /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
-                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job */
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job. With `Prefer: respond-async` only */
+                "idempotency-key"?: string;
+                /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
+                Range?: string;
+            };
+            path: {
+                mesh_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["StepsRequest"];
+            };
+        };
+        responses: {
+            /** @description The steps, in order. In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` names what is too long for one */
+            200: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StepsAnswer"];
+                };
+            };
+            /** @description With `Prefer: respond-async`: the job */
+            202: {
+                headers: {
+                    Location: components["headers"]["Location"];
+                    "Preference-Applied": components["headers"]["Preference-Applied"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobDocument"];
+                };
+            };
+            /** @description The requested range */
+            206: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Content-Range": components["headers"]["Content-Range"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": string;
+                };
+            };
+            /** @description malformed_body, idempotency_key_unused, malformed_request */
+            400: components["responses"]["Problem"];
+            /** @description unauthorized */
+            401: components["responses"]["Unauthorized"];
+            /** @description origin_not_allowed */
+            403: components["responses"]["Problem"];
+            /** @description mesh_not_found */
+            404: components["responses"]["Problem"];
+            /** @description not_acceptable */
+            406: components["responses"]["Problem"];
+            /** @description upload_too_large, result_too_large */
+            413: components["responses"]["Problem"];
+            /** @description unsupported_media_type */
+            415: components["responses"]["Problem"];
+            /** @description range_not_satisfiable */
+            416: components["responses"]["Problem"];
+            /** @description host_not_allowed */
+            421: components["responses"]["Problem"];
+            /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
+            422: components["responses"]["Problem"];
+            /** @description quota_exceeded, rate_limited */
+            429: components["responses"]["ProblemForNow"];
+            /** @description header_too_large */
+            431: components["responses"]["Problem"];
+            /** @description worker_died, mesh_damaged, internal_error */
+            500: components["responses"]["Problem"];
+            /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
+            503: components["responses"]["ProblemForNow"];
+            /** @description deadline_exceeded */
+            504: components["responses"]["Problem"];
+            /** @description storage_full, quota_exceeded */
+            507: components["responses"]["Problem"];
+        };
+    };
+    computePaths: {
+        parameters: {
+            query?: {
+                /** @description Overrides `Accept` */
+                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv";
+                /** @description Type of the numbers in `npy`, `npz` and `octets` */
+                dtype?: "float64" | "float32";
+            };
+            header?: {
+                /** @description The longest time that the client waits, in milliseconds; it bounds no job */
+                "x-timeout-ms"?: number;
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
+                prefer?: string;
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job. With `Prefer: respond-async` only */
                 "idempotency-key"?: string;
                 /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
                 Range?: string;
@@ -3125,11 +2877,9 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["PathsAnswer"] | components["schemas"]["Estimate"];
+                    "application/json": components["schemas"]["PathsAnswer"];
                     "model/obj": string;
                     "text/csv": string;
-                    "image/svg+xml": string;
-                    "application/geo+json": components["schemas"]["FeatureCollection"];
                 };
             };
             /** @description With `Prefer: respond-async`: the job */
@@ -3162,191 +2912,56 @@ export interface operations {
                     "application/json": string;
                     "model/obj": string;
                     "text/csv": string;
-                    "image/svg+xml": string;
-                    "application/geo+json": string;
                 };
             };
-            /** @description malformed_body, malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            /** @description malformed_body, idempotency_key_unused, malformed_request */
+            400: components["responses"]["Problem"];
             /** @description unauthorized */
-            401: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            401: components["responses"]["Unauthorized"];
             /** @description origin_not_allowed */
-            403: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            403: components["responses"]["Problem"];
             /** @description mesh_not_found */
-            404: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            404: components["responses"]["Problem"];
             /** @description not_acceptable */
-            406: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            406: components["responses"]["Problem"];
             /** @description upload_too_large, result_too_large */
-            413: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            413: components["responses"]["Problem"];
             /** @description unsupported_media_type */
-            415: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            415: components["responses"]["Problem"];
             /** @description range_not_satisfiable */
-            416: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            416: components["responses"]["Problem"];
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
-            422: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            422: components["responses"]["Problem"];
             /** @description quota_exceeded, rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description worker_died, mesh_damaged, internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
-            /** @description storage_full */
-            507: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
+            /** @description storage_full, quota_exceeded */
+            507: components["responses"]["Problem"];
         };
     };
     computeIsolines: {
         parameters: {
             query?: {
                 /** @description Overrides `Accept` */
-                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv" | "svg" | "geojson";
+                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv";
                 /** @description Type of the numbers in `npy`, `npz` and `octets` */
                 dtype?: "float64" | "float32";
-                /** @description Do not compute; answer with an `Estimate` of the cost, in JSON */
-                estimate?: boolean;
             };
             header?: {
                 /** @description The longest time that the client waits, in milliseconds; it bounds no job */
                 "x-timeout-ms"?: number;
                 /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
-                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job */
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job. With `Prefer: respond-async` only */
                 "idempotency-key"?: string;
                 /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
                 Range?: string;
@@ -3375,11 +2990,9 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["IsolinesAnswer"] | components["schemas"]["Estimate"];
+                    "application/json": components["schemas"]["IsolinesAnswer"];
                     "model/obj": string;
                     "text/csv": string;
-                    "image/svg+xml": string;
-                    "application/geo+json": components["schemas"]["FeatureCollection"];
                 };
             };
             /** @description With `Prefer: respond-async`: the job */
@@ -3412,191 +3025,56 @@ export interface operations {
                     "application/json": string;
                     "model/obj": string;
                     "text/csv": string;
-                    "image/svg+xml": string;
-                    "application/geo+json": string;
                 };
             };
-            /** @description malformed_body, malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            /** @description malformed_body, idempotency_key_unused, malformed_request */
+            400: components["responses"]["Problem"];
             /** @description unauthorized */
-            401: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            401: components["responses"]["Unauthorized"];
             /** @description origin_not_allowed */
-            403: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            403: components["responses"]["Problem"];
             /** @description mesh_not_found */
-            404: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            404: components["responses"]["Problem"];
             /** @description not_acceptable */
-            406: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            406: components["responses"]["Problem"];
             /** @description upload_too_large, result_too_large */
-            413: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            413: components["responses"]["Problem"];
             /** @description unsupported_media_type */
-            415: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            415: components["responses"]["Problem"];
             /** @description range_not_satisfiable */
-            416: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            416: components["responses"]["Problem"];
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
-            422: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            422: components["responses"]["Problem"];
             /** @description quota_exceeded, rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description worker_died, mesh_damaged, internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
-            /** @description storage_full */
-            507: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
+            /** @description storage_full, quota_exceeded */
+            507: components["responses"]["Problem"];
         };
     };
     computeBorders: {
         parameters: {
             query?: {
                 /** @description Overrides `Accept` */
-                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv" | "svg" | "geojson";
+                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv";
                 /** @description Type of the numbers in `npy`, `npz` and `octets` */
                 dtype?: "float64" | "float32";
-                /** @description Do not compute; answer with an `Estimate` of the cost, in JSON */
-                estimate?: boolean;
             };
             header?: {
                 /** @description The longest time that the client waits, in milliseconds; it bounds no job */
                 "x-timeout-ms"?: number;
                 /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
-                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job */
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job. With `Prefer: respond-async` only */
                 "idempotency-key"?: string;
                 /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
                 Range?: string;
@@ -3625,11 +3103,9 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["BordersAnswer"] | components["schemas"]["Estimate"];
+                    "application/json": components["schemas"]["BordersAnswer"];
                     "model/obj": string;
                     "text/csv": string;
-                    "image/svg+xml": string;
-                    "application/geo+json": components["schemas"]["FeatureCollection"];
                 };
             };
             /** @description With `Prefer: respond-async`: the job */
@@ -3662,191 +3138,56 @@ export interface operations {
                     "application/json": string;
                     "model/obj": string;
                     "text/csv": string;
-                    "image/svg+xml": string;
-                    "application/geo+json": string;
                 };
             };
-            /** @description malformed_body, malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            /** @description malformed_body, idempotency_key_unused, malformed_request */
+            400: components["responses"]["Problem"];
             /** @description unauthorized */
-            401: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            401: components["responses"]["Unauthorized"];
             /** @description origin_not_allowed */
-            403: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            403: components["responses"]["Problem"];
             /** @description mesh_not_found */
-            404: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            404: components["responses"]["Problem"];
             /** @description not_acceptable */
-            406: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            406: components["responses"]["Problem"];
             /** @description upload_too_large, result_too_large */
-            413: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            413: components["responses"]["Problem"];
             /** @description unsupported_media_type */
-            415: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            415: components["responses"]["Problem"];
             /** @description range_not_satisfiable */
-            416: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            416: components["responses"]["Problem"];
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
-            422: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            422: components["responses"]["Problem"];
             /** @description quota_exceeded, rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description worker_died, mesh_damaged, internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
-            /** @description storage_full */
-            507: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
+            /** @description storage_full, quota_exceeded */
+            507: components["responses"]["Problem"];
         };
     };
     computeMatrix: {
         parameters: {
             query?: {
                 /** @description Overrides `Accept` */
-                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv" | "svg" | "geojson";
+                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv";
                 /** @description Type of the numbers in `npy`, `npz` and `octets` */
                 dtype?: "float64" | "float32";
-                /** @description Do not compute; answer with an `Estimate` of the cost, in JSON */
-                estimate?: boolean;
             };
             header?: {
                 /** @description The longest time that the client waits, in milliseconds; it bounds no job */
                 "x-timeout-ms"?: number;
                 /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
-                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job */
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job. With `Prefer: respond-async` only */
                 "idempotency-key"?: string;
                 /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
                 Range?: string;
@@ -3877,7 +3218,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["MatrixAnswer"] | components["schemas"]["Estimate"];
+                    "application/json": components["schemas"]["MatrixAnswer"];
                     "application/x-npy": string;
                     "application/x-npz": string;
                     "application/octet-stream": string;
@@ -3918,187 +3259,54 @@ export interface operations {
                     "text/csv": string;
                 };
             };
-            /** @description malformed_body, malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            /** @description malformed_body, idempotency_key_unused, malformed_request */
+            400: components["responses"]["Problem"];
             /** @description unauthorized */
-            401: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            401: components["responses"]["Unauthorized"];
             /** @description origin_not_allowed */
-            403: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            403: components["responses"]["Problem"];
             /** @description mesh_not_found */
-            404: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            404: components["responses"]["Problem"];
             /** @description not_acceptable */
-            406: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            406: components["responses"]["Problem"];
             /** @description upload_too_large, result_too_large */
-            413: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            413: components["responses"]["Problem"];
             /** @description unsupported_media_type */
-            415: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            415: components["responses"]["Problem"];
             /** @description range_not_satisfiable */
-            416: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            416: components["responses"]["Problem"];
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
-            422: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            422: components["responses"]["Problem"];
             /** @description quota_exceeded, rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description worker_died, mesh_damaged, internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
-            /** @description storage_full */
-            507: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
+            /** @description storage_full, quota_exceeded */
+            507: components["responses"]["Problem"];
         };
     };
     findNearest: {
         parameters: {
             query?: {
                 /** @description Overrides `Accept` */
-                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv" | "svg" | "geojson";
+                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv";
                 /** @description Type of the numbers in `npy`, `npz` and `octets` */
                 dtype?: "float64" | "float32";
-                /** @description Do not compute; answer with an `Estimate` of the cost, in JSON */
-                estimate?: boolean;
             };
             header?: {
                 /** @description The longest time that the client waits, in milliseconds; it bounds no job */
                 "x-timeout-ms"?: number;
                 /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
-                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job */
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job. With `Prefer: respond-async` only */
                 "idempotency-key"?: string;
                 /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
                 Range?: string;
@@ -4127,9 +3335,8 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["NearestAnswer"] | components["schemas"]["Estimate"];
+                    "application/json": components["schemas"]["NearestAnswer"];
                     "text/csv": string;
-                    "application/geo+json": components["schemas"]["FeatureCollection"];
                 };
             };
             /** @description With `Prefer: respond-async`: the job */
@@ -4161,190 +3368,56 @@ export interface operations {
                 content: {
                     "application/json": string;
                     "text/csv": string;
-                    "application/geo+json": string;
                 };
             };
-            /** @description malformed_body, malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            /** @description malformed_body, idempotency_key_unused, malformed_request */
+            400: components["responses"]["Problem"];
             /** @description unauthorized */
-            401: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            401: components["responses"]["Unauthorized"];
             /** @description origin_not_allowed */
-            403: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            403: components["responses"]["Problem"];
             /** @description mesh_not_found */
-            404: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            404: components["responses"]["Problem"];
             /** @description not_acceptable */
-            406: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            406: components["responses"]["Problem"];
             /** @description upload_too_large, result_too_large */
-            413: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            413: components["responses"]["Problem"];
             /** @description unsupported_media_type */
-            415: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            415: components["responses"]["Problem"];
             /** @description range_not_satisfiable */
-            416: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            416: components["responses"]["Problem"];
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
-            422: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            422: components["responses"]["Problem"];
             /** @description quota_exceeded, rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description worker_died, mesh_damaged, internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
-            /** @description storage_full */
-            507: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
+            /** @description storage_full, quota_exceeded */
+            507: components["responses"]["Problem"];
         };
     };
     locatePoints: {
         parameters: {
             query?: {
                 /** @description Overrides `Accept` */
-                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv" | "svg" | "geojson";
+                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv";
                 /** @description Type of the numbers in `npy`, `npz` and `octets` */
                 dtype?: "float64" | "float32";
-                /** @description Do not compute; answer with an `Estimate` of the cost, in JSON */
-                estimate?: boolean;
             };
             header?: {
                 /** @description The longest time that the client waits, in milliseconds; it bounds no job */
                 "x-timeout-ms"?: number;
                 /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
-                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job */
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job. With `Prefer: respond-async` only */
                 "idempotency-key"?: string;
                 /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
                 Range?: string;
@@ -4373,9 +3446,8 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["LocateAnswer"] | components["schemas"]["Estimate"];
+                    "application/json": components["schemas"]["LocateAnswer"];
                     "text/csv": string;
-                    "application/geo+json": components["schemas"]["FeatureCollection"];
                 };
             };
             /** @description With `Prefer: respond-async`: the job */
@@ -4407,172 +3479,40 @@ export interface operations {
                 content: {
                     "application/json": string;
                     "text/csv": string;
-                    "application/geo+json": string;
                 };
             };
-            /** @description malformed_body, malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            /** @description malformed_body, idempotency_key_unused, malformed_request */
+            400: components["responses"]["Problem"];
             /** @description unauthorized */
-            401: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            401: components["responses"]["Unauthorized"];
             /** @description origin_not_allowed */
-            403: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            403: components["responses"]["Problem"];
             /** @description mesh_not_found */
-            404: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            404: components["responses"]["Problem"];
             /** @description not_acceptable */
-            406: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            406: components["responses"]["Problem"];
             /** @description upload_too_large, result_too_large */
-            413: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            413: components["responses"]["Problem"];
             /** @description unsupported_media_type */
-            415: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            415: components["responses"]["Problem"];
             /** @description range_not_satisfiable */
-            416: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            416: components["responses"]["Problem"];
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
-            422: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            422: components["responses"]["Problem"];
             /** @description quota_exceeded, rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description worker_died, mesh_damaged, internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
-            /** @description storage_full */
-            507: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
+            /** @description storage_full, quota_exceeded */
+            507: components["responses"]["Problem"];
         };
     };
     listMeshes: {
@@ -4581,6 +3521,8 @@ export interface operations {
                 limit?: number;
                 /** @description `next_cursor` of the previous part */
                 cursor?: string;
+                /** @description Only meshes of this name */
+                name?: string;
             };
             header?: never;
             path?: never;
@@ -4599,98 +3541,23 @@ export interface operations {
                 };
             };
             /** @description malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            400: components["responses"]["Problem"];
             /** @description unauthorized */
-            401: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            401: components["responses"]["Unauthorized"];
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description invalid_request */
-            422: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            422: components["responses"]["Problem"];
             /** @description rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description store_unavailable, too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
         };
     };
     createMesh: {
@@ -4752,67 +3619,18 @@ export interface operations {
                     "application/json": components["schemas"]["MeshDocument"];
                 };
             };
-            /** @description malformed_body, malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            /** @description malformed_body, idempotency_key_unused, malformed_request */
+            400: components["responses"]["Problem"];
             /** @description unauthorized */
-            401: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            401: components["responses"]["Unauthorized"];
             /** @description origin_not_allowed */
-            403: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            403: components["responses"]["Problem"];
             /** @description upload_too_large */
-            413: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            413: components["responses"]["Problem"];
             /** @description unsupported_media_type */
-            415: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            415: components["responses"]["Problem"];
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description invalid_mesh, invalid_request, limit_exceeded, memory_limit */
             422: {
                 headers: {
@@ -4824,67 +3642,17 @@ export interface operations {
                 };
             };
             /** @description quota_exceeded, rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description worker_died, mesh_damaged, internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
             /** @description storage_full, quota_exceeded */
-            507: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            507: components["responses"]["Problem"];
         };
     };
     getMesh: {
@@ -4923,26 +3691,9 @@ export interface operations {
                 content?: never;
             };
             /** @description malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            400: components["responses"]["Problem"];
             /** @description unauthorized */
-            401: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            401: components["responses"]["Unauthorized"];
             /** @description mesh_not_found */
             404: {
                 headers: {
@@ -4954,67 +3705,17 @@ export interface operations {
                 };
             };
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description mesh_damaged, internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description store_unavailable, too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
         };
     };
     deleteMesh: {
@@ -5037,36 +3738,11 @@ export interface operations {
                 content?: never;
             };
             /** @description malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            400: components["responses"]["Problem"];
             /** @description unauthorized */
-            401: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            401: components["responses"]["Unauthorized"];
             /** @description forbidden, origin_not_allowed */
-            403: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            403: components["responses"]["Problem"];
             /** @description mesh_not_found */
             404: {
                 headers: {
@@ -5078,67 +3754,17 @@ export interface operations {
                 };
             };
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description store_unavailable, too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
         };
     };
     getMeshArray: {
@@ -5197,108 +3823,25 @@ export interface operations {
                 content?: never;
             };
             /** @description malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            400: components["responses"]["Problem"];
             /** @description unauthorized */
-            401: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            401: components["responses"]["Unauthorized"];
             /** @description mesh_not_found, not_found */
-            404: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            404: components["responses"]["Problem"];
             /** @description range_not_satisfiable */
-            416: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            416: components["responses"]["Problem"];
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description mesh_damaged, internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description store_unavailable, too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
         };
     };
     listJobs: {
@@ -5326,98 +3869,23 @@ export interface operations {
                 };
             };
             /** @description malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            400: components["responses"]["Problem"];
             /** @description unauthorized */
-            401: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            401: components["responses"]["Unauthorized"];
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description invalid_request */
-            422: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            422: components["responses"]["Problem"];
             /** @description rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description state_unavailable, too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
         };
     };
     getJob: {
@@ -5443,26 +3911,9 @@ export interface operations {
                 };
             };
             /** @description malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            400: components["responses"]["Problem"];
             /** @description unauthorized */
-            401: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            401: components["responses"]["Unauthorized"];
             /** @description job_not_found */
             404: {
                 headers: {
@@ -5474,70 +3925,20 @@ export interface operations {
                 };
             };
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description state_unavailable, too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
         };
     };
-    dismissJob: {
+    deleteJob: {
         parameters: {
             query?: never;
             header?: never;
@@ -5559,108 +3960,68 @@ export interface operations {
                 };
             };
             /** @description malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            400: components["responses"]["Problem"];
             /** @description unauthorized */
-            401: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            401: components["responses"]["Unauthorized"];
             /** @description origin_not_allowed */
-            403: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            403: components["responses"]["Problem"];
             /** @description job_not_found */
-            404: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            404: components["responses"]["Problem"];
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description state_unavailable, too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
+            504: components["responses"]["Problem"];
+        };
+    };
+    cancelJob: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                job_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                    "application/json": components["schemas"]["JobDocument"];
                 };
             };
+            /** @description malformed_request */
+            400: components["responses"]["Problem"];
+            /** @description unauthorized */
+            401: components["responses"]["Unauthorized"];
+            /** @description origin_not_allowed */
+            403: components["responses"]["Problem"];
+            /** @description job_not_found */
+            404: components["responses"]["Problem"];
+            /** @description host_not_allowed */
+            421: components["responses"]["Problem"];
+            /** @description rate_limited */
+            429: components["responses"]["ProblemForNow"];
+            /** @description header_too_large */
+            431: components["responses"]["Problem"];
+            /** @description internal_error */
+            500: components["responses"]["Problem"];
+            /** @description state_unavailable, too_many_connections */
+            503: components["responses"]["ProblemForNow"];
+            /** @description deadline_exceeded */
+            504: components["responses"]["Problem"];
         };
     };
     getJobResults: {
@@ -5718,169 +4079,37 @@ export interface operations {
                 content?: never;
             };
             /** @description malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            400: components["responses"]["Problem"];
             /** @description unauthorized */
-            401: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            401: components["responses"]["Unauthorized"];
             /** @description job_not_found, mesh_not_found */
-            404: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            404: components["responses"]["Problem"];
             /** @description not_acceptable */
-            406: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            406: components["responses"]["Problem"];
             /** @description job_not_finished */
-            409: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            409: components["responses"]["ProblemForNow"];
             /** @description job_dismissed */
-            410: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            410: components["responses"]["Problem"];
             /** @description result_too_large */
-            413: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            413: components["responses"]["Problem"];
             /** @description range_not_satisfiable */
-            416: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            416: components["responses"]["Problem"];
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
-            422: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            422: components["responses"]["Problem"];
             /** @description rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description worker_died, mesh_damaged, internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
             /** @description storage_full */
-            507: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            507: components["responses"]["Problem"];
         };
     };
     watchJob: {
@@ -5908,108 +4137,25 @@ export interface operations {
                 };
             };
             /** @description malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            400: components["responses"]["Problem"];
             /** @description unauthorized */
-            401: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            401: components["responses"]["Unauthorized"];
             /** @description job_not_found */
-            404: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            404: components["responses"]["Problem"];
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description invalid_request */
-            422: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            422: components["responses"]["Problem"];
             /** @description rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description state_unavailable, too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
         };
     };
     getIndex: {
@@ -6034,77 +4180,19 @@ export interface operations {
                 };
             };
             /** @description malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            400: components["responses"]["Problem"];
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
         };
     };
     getLiveness: {
@@ -6127,77 +4215,19 @@ export interface operations {
                 };
             };
             /** @description malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            400: components["responses"]["Problem"];
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
         };
     };
     getReadiness: {
@@ -6220,77 +4250,19 @@ export interface operations {
                 };
             };
             /** @description malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            400: components["responses"]["Problem"];
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description engine_unavailable, draining, too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
         };
     };
     getAbout: {
@@ -6313,88 +4285,21 @@ export interface operations {
                 };
             };
             /** @description malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            400: components["responses"]["Problem"];
             /** @description unauthorized */
-            401: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            401: components["responses"]["Unauthorized"];
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
         };
     };
     getMetrics: {
@@ -6418,88 +4323,21 @@ export interface operations {
                 };
             };
             /** @description malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            400: components["responses"]["Problem"];
             /** @description unauthorized */
-            401: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            401: components["responses"]["Unauthorized"];
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
         };
     };
     getProblem: {
@@ -6525,15 +4363,7 @@ export interface operations {
                 };
             };
             /** @description malformed_request */
-            400: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            400: components["responses"]["Problem"];
             /** @description not_found */
             404: {
                 headers: {
@@ -6545,67 +4375,17 @@ export interface operations {
                 };
             };
             /** @description host_not_allowed */
-            421: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            421: components["responses"]["Problem"];
             /** @description rate_limited */
-            429: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            429: components["responses"]["ProblemForNow"];
             /** @description header_too_large */
-            431: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            431: components["responses"]["Problem"];
             /** @description internal_error */
-            500: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            500: components["responses"]["Problem"];
             /** @description too_many_connections */
-            503: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    "Retry-After": components["headers"]["Retry-After"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
-            504: {
-                headers: {
-                    "X-Request-ID": components["headers"]["X-Request-ID"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["ProblemDocument"];
-                };
-            };
+            504: components["responses"]["Problem"];
         };
     };
 }

@@ -11,6 +11,7 @@ import numpy as np
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.errors import BlockedSource, InvalidArgument, InvalidPoint, NoPath
+from geodesic_core.fields.vertex_points import VertexPoints
 from geodesic_core.kernels.front.state import NO_SITES, NODE, SEGMENT, SEGMENT_ENDS, SITE, Sites
 from geodesic_core.mesh.barriers import walled_in
 from geodesic_core.mesh.canonical import half_edges_around, remedy
@@ -73,8 +74,8 @@ class Nodes:
 class Ends:
     """The ends of several sweeps, each from one source to some of the targets."""
 
-    sources: tuple[SurfacePoint, ...]
-    targets: tuple[SurfacePoint, ...]
+    sources: Sequence[SurfacePoint]
+    targets: Sequence[SurfacePoint]
     source_components: Ints
     """(N,): the connected component of each source"""
     target_components: Ints
@@ -124,12 +125,15 @@ def ends_of(
     Cancelled, DeadlineExceeded
         As the control says.
     """
-    corners, reaches = np.empty((len(targets), 3), np.int32), np.empty((len(targets), 3))
-    for i, target in enumerate(control.watched(targets)):
-        corners[i], reaches[i] = corners_of(mesh, target)
+    corners, reaches = np.empty((len(targets), 3), np.int32), np.zeros((len(targets), 3))
+    if isinstance(targets, VertexPoints):
+        corners[:] = mesh.topology.inner_vertex[targets.vertices][:, None]
+    else:
+        for i, target in enumerate(control.watched(targets)):
+            corners[i], reaches[i] = corners_of(mesh, target)
     return Ends(
-        sources=tuple(sources),
-        targets=tuple(targets),
+        sources=sources,
+        targets=targets,
         source_components=components_of(mesh, sources, control),
         target_components=components_of(mesh, targets, control),
         corners=corners,
@@ -172,7 +176,11 @@ def nodes_of(
         for point in watched(dict.fromkeys(line))
     ]
     first_target = len(rows)
-    ends = [node_of(point) for point in watched(targets)]
+    ends = (
+        mesh.topology.inner_vertex[targets.vertices]
+        if isinstance(targets, VertexPoints)
+        else [node_of(point) for point in watched(targets)]
+    )
     segments = [
         (i, parts) for i, line in enumerate(sources) for parts in segments_of(mesh, watched(line))
     ]
@@ -295,7 +303,7 @@ def each_of(points: Points, name: str) -> Iterable[Point]:
 
 def as_points(
     mesh: TriangleMesh, points: Points, name: str, control: Control
-) -> list[SurfacePoint]:
+) -> Sequence[SurfacePoint]:
     """Return canonical points; ``name`` is how messages call one of them.
 
     Raises
@@ -307,10 +315,12 @@ def as_points(
     Cancelled, DeadlineExceeded
         As the control says.
     """
-    canonical = [
-        mesh.point(point, f"{name} {i}")
-        for i, point in enumerate(control.watched(each_of(points, name)))
-    ]
+    given = each_of(points, name)
+    vertices = VertexPoints.of(mesh, given)
+    if vertices is not None:
+        control.checkpoint(0.0)
+        return vertices
+    canonical = [mesh.point(point, f"{name} {i}") for i, point in enumerate(control.watched(given))]
     if not canonical:
         raise InvalidArgument(f"there are no {name}s: give at least one")
     return canonical
@@ -332,6 +342,8 @@ def components_of(mesh: TriangleMesh, points: Sequence[SurfacePoint], control: C
     Cancelled, DeadlineExceeded
         As the control says.
     """
+    if isinstance(points, VertexPoints):
+        return mesh.components[points.vertices].astype(np.int32)
     return np.array([component_of(mesh, point) for point in control.watched(points)], np.int32)
 
 

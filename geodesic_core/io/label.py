@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Longs
+from geodesic_core.control import Control
 from geodesic_core.errors import EmptyBarrier, GeodesicError, InvalidArgument, InvalidMesh
 from geodesic_core.extras import extra
 from geodesic_core.io.annotation import check_vertices, read_annotation
@@ -133,7 +134,7 @@ def _vertices_of(path: Path, mesh: TriangleMesh, label: _Label, outside: bool) -
     """Return which vertices of a mesh are in the label of a file, or outside; at least one is."""
     count = len(mesh.vertices if mesh.vertex_map is None else mesh.vertex_map)
     try:
-        file = read_unpacked(path, _READERS, None)
+        file = read_unpacked(path, _READERS, None, Control())
     except InvalidMesh as error:
         raise InvalidArgument(str(error)) from error
     if file.suffix not in _READERS:

@@ -11,7 +11,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from geodesic_core.errors import InvalidMesh, MissingExtra, TooManyFaces, UnknownFileType
+from geodesic_core.control import Control
+from geodesic_core.errors import (
+    InvalidMesh,
+    MissingExtra,
+    TooManyFaces,
+    TooManyVertices,
+    UnknownFileType,
+)
 from geodesic_core.io.brain import read_freesurfer, read_gifti
 from geodesic_core.io.contents import FileContents
 from geodesic_core.io.glb import read_glb, read_gltf
@@ -52,7 +59,9 @@ def load_mesh(
     merge: Merge = "none",
     *,
     max_faces: int | None = None,
+    max_vertices: int | None = None,
     max_bytes: int | None = None,
+    cancel: Callable[[], bool] | None = None,
 ) -> TriangleMesh:
     r"""Read a mesh file: OBJ, OFF, PLY, STL, GLB, GIFTI, FreeSurfer, VTK or an Esri ASCII grid.
 
@@ -82,8 +91,13 @@ def load_mesh(
     max_faces
         Largest number of triangles. A file with more is refused before its faces are parsed, by the
         count in its header or by counting.
+    max_vertices
+        Largest number of vertices, before any are merged; those without a face count as well.
     max_bytes
         Largest size of a packed file when it is unpacked.
+    cancel
+        Called while the file is unpacked, and before each further step; the call stops with
+        `Cancelled` once it returns true.
 
     Returns
     -------
@@ -94,6 +108,8 @@ def load_mesh(
     ------
     TooManyFaces
         There are more than ``max_faces``; an `InvalidMesh` as well.
+    TooManyVertices
+        There are more than ``max_vertices``; an `InvalidMesh` as well.
     UnknownFileType
         Neither name nor content tells the type, or it is none of these; an `InvalidMesh` as well.
     FileTooLarge
@@ -103,6 +119,8 @@ def load_mesh(
         holds a mesh that `TriangleMesh` refuses.
     InvalidArgument
         ``merge`` is no way of merging.
+    Cancelled
+        ``cancel`` returned true.
     MissingExtra
         GIFTI needs nibabel, the extra ``brain``; VTK's files need VTK, the extra ``vtk``.
 
@@ -116,8 +134,10 @@ def load_mesh(
     >>> gc.load_mesh(text, "off")
     TriangleMesh(3 vertices, 1 faces)
     """
-    file = read_unpacked(source, _READERS, max_bytes)
+    control = Control(cancel=cancel)
+    file = read_unpacked(source, _READERS, max_bytes, control)
     kind = _kind_of(file, file_type)
+    control.checkpoint(0.0)
     if not file.data:
         raise InvalidMesh(f"the {kind.upper()} file is empty")
     try:
@@ -127,6 +147,9 @@ def load_mesh(
     except Exception as error:  # any failure of a parser
         raise _explained(error, kind, file.data) from error
     check_face_count(int(np.maximum(read.sizes - 2, 1).sum()), max_faces)
+    if max_vertices is not None and len(read.vertices) > max_vertices:
+        raise TooManyVertices(len(read.vertices), max_vertices)
+    control.checkpoint(0.5)
     if kind == "stl" and merge == "none":
         merge = "exact"
     notes = read.notes

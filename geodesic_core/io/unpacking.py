@@ -13,6 +13,7 @@ from functools import partial
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple, Protocol, TypeGuard
 
+from geodesic_core.control import Control
 from geodesic_core.errors import FileTooLarge, InvalidMesh
 
 _BLOCK = 1 << 16
@@ -66,7 +67,9 @@ def is_file(value: Any) -> TypeGuard[FileLike]:
     return isinstance(value, kinds) or hasattr(value, "read")
 
 
-def read_unpacked(source: FileLike, suffixes: Container[str], max_bytes: int | None) -> NamedBytes:
+def read_unpacked(
+    source: FileLike, suffixes: Container[str], max_bytes: int | None, control: Control
+) -> NamedBytes:
     """Return a file's content, unpacked if it comes from zip, gzip, bzip2 or xz.
 
     A zip archive must hold one file of the ``suffixes``. Text in UTF-16 or UTF-32 becomes UTF-8,
@@ -78,14 +81,18 @@ def read_unpacked(source: FileLike, suffixes: Container[str], max_bytes: int | N
         It cannot be read or unpacked; an archive holds none of these files, or several.
     FileTooLarge
         Unpacked, it has more than ``max_bytes``.
+    Cancelled
+        The ``control`` says so.
     """
     file = _read(source)
     if file.data.startswith(_ZIP):
-        file = _only_member(file.data, suffixes, max_bytes)
+        file = _only_member(file.data, suffixes, max_bytes, control)
     for program, magic, opened in _PROGRAMS:
         if file.data.startswith(magic):
             packed = io.BytesIO(file.data)
-            return _decoded(file.name, _unpack(program, partial(opened, packed), max_bytes))
+            return _decoded(
+                file.name, _unpack(program, partial(opened, packed), max_bytes, control)
+            )
     return _decoded(*file)
 
 
@@ -113,7 +120,9 @@ def _read(source: FileLike) -> NamedBytes:
     )
 
 
-def _only_member(data: bytes, suffixes: Container[str], max_bytes: int | None) -> NamedBytes:
+def _only_member(
+    data: bytes, suffixes: Container[str], max_bytes: int | None, control: Control
+) -> NamedBytes:
     """Return the one file of these suffixes in a zip archive."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -126,7 +135,7 @@ def _only_member(data: bytes, suffixes: Container[str], max_bytes: int | None) -
                     f"{len(chosen) or 'none'}: {held}"
                 )
             name = chosen[0]
-            return NamedBytes(name, _unpack("zip", partial(archive.open, name), max_bytes))
+            return NamedBytes(name, _unpack("zip", partial(archive.open, name), max_bytes, control))
     except (zipfile.BadZipFile, NotImplementedError, ValueError) as error:
         what = " ".join(str(error).split())[:100]  # which may hold any part of the file
         raise InvalidMesh(f"the file is a damaged zip archive: {what}") from error
@@ -139,11 +148,14 @@ def _is_content(name: str) -> bool:
     )
 
 
-def _unpack(program: str, opened: Callable[[], Any], max_bytes: int | None) -> bytes:
+def _unpack(
+    program: str, opened: Callable[[], Any], max_bytes: int | None, control: Control
+) -> bytes:
     content = bytearray()
     try:
         with opened() as file:
             while block := file.read(_BLOCK):
+                control.checkpoint(0.0)
                 content += block
                 if max_bytes is not None and len(content) > max_bytes:
                     raise FileTooLarge(max_bytes)

@@ -23,6 +23,7 @@ from geodesic_core.errors import InvalidArgument
 from geodesic_core.fields.methods import Effort, Method, promise_of, sweep_of
 from geodesic_core.fields.path import ErrorBound
 from geodesic_core.fields.sources import as_points
+from geodesic_core.fields.vertex_points import VertexPoints
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
 from geodesic_core.kernels.jit.cache import sources_digest
 from geodesic_core.matrices import dense, sparse
@@ -224,11 +225,13 @@ def _place_for(out: str | Path) -> tuple[Path, str]:
 
 def _points(
     mesh: TriangleMesh, points: Sequence[Point] | Everywhere, name: str, control: Control
-) -> tuple[list[SurfacePoint], Any]:
+) -> tuple[Sequence[SurfacePoint], Any]:
     """Return canonical points, and how the facts of a file name them, which a service reads too."""
     if isinstance(points, str) and points == "all":
         return as_points(mesh, range(len(mesh.vertices)), name, control), points
     canonical = as_points(mesh, points, name, control)
+    if isinstance(canonical, VertexPoints):
+        return canonical, canonical.vertices.tolist()
     return canonical, [
         {"face": int(point.face_index), "barycentric": point.barycentric}
         if point.vertex_index is None

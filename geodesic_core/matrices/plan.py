@@ -8,6 +8,7 @@ import numpy as np
 from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.control import Control
 from geodesic_core.fields.sources import Ends, ends_of
+from geodesic_core.fields.vertex_points import VertexPoints
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
@@ -58,8 +59,8 @@ class Plan:
         order = np.arange(min(len(sources), len(sources if targets is None else targets)))
         if targets is None:
             if not in_order:
-                order = sweep_order(np.array([mesh.position(point) for point in sources]))
-                sources = [sources[i] for i in order.tolist()]
+                order = sweep_order(_positions(mesh, sources))
+                sources = _taken(sources, order)
             swept_from, others = sources, sources
         else:
             swept_from, others = (targets, sources) if is_flipped else (sources, targets)
@@ -96,6 +97,20 @@ class Plan:
     def targets_of(self, sweep: int) -> Ints:
         """Return the targets of a sweep: of a symmetric table, itself and those after it."""
         return np.arange(sweep if self.is_symmetric else 0, self.width, dtype=np.int32)
+
+
+def _positions(mesh: TriangleMesh, points: Sequence[SurfacePoint]) -> Floats:
+    """Return the positions of canonical points, (n, 3)."""
+    if isinstance(points, VertexPoints):
+        return mesh.vertices[points.vertices]
+    return np.array([mesh.position(point) for point in points])
+
+
+def _taken(points: Sequence[SurfacePoint], order: Longs) -> Sequence[SurfacePoint]:
+    """Return points in another order."""
+    if isinstance(points, VertexPoints):
+        return points.take(order)
+    return [points[i] for i in order.tolist()]
 
 
 def sweep_order(positions: Floats) -> Longs:

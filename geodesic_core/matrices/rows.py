@@ -14,6 +14,7 @@ from geodesic_core.fields.methods import SweepOf
 from geodesic_core.fields.question import Question
 from geodesic_core.fields.sources import Ends
 from geodesic_core.fields.sweeps import ExactSweep
+from geodesic_core.fields.vertex_points import vertices_of
 from geodesic_core.mesh.surface_point import Points, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.target_sweep import TargetSweep
@@ -72,8 +73,7 @@ class FieldRows:
     @cached_property
     def _vertices(self) -> Ints:
         """The vertex of each target; -1 for another point."""
-        vertices = (point.vertex_index for point in self.ends.targets)
-        return np.array([-1 if vertex is None else vertex for vertex in vertices], np.int32)
+        return vertices_of(self.ends.targets)
 
     def distances(self, source: int, targets: Ints, control: Control) -> Floats:
         """Return the distances from a source to targets; infinite where out of reach."""

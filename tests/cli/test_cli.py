@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -125,25 +124,13 @@ def test_lines_in_each_format(run: Run, knot: Path) -> None:
         "borders": ["--source", 3, "--source", 700],
     }
     for command, arguments in commands.items():
-        for suffix in ("csv", "svg", "geojson"):
+        for suffix in ("csv", "obj"):
             assert run(command, knot, *arguments, "--out", f"{command}.{suffix}").code == 0
-        features = json.loads(Path(f"{command}.geojson").read_text())["features"]
+        drawn = Path(f"{command}.obj").read_text().splitlines()
+        points = [[float(x) for x in line.split()[1:]] for line in drawn if line[:2] == "v "]
         rows = rows_of(f"{command}.csv")
-        lines = [feature["geometry"]["coordinates"] for feature in features]
-        closed = [feature["properties"].get("closed", False) for feature in features]
-        points = [
-            p
-            for line, is_closed in zip(lines, closed, strict=True)
-            for p in line[: len(line) - is_closed]
-        ]
         assert [[float(row[x]) for x in "xyz"] for row in rows] == points
-        drawn = [*ET.parse(f"{command}.svg").getroot()][1:]  # noqa: S314 - our own
-        assert len(drawn) == len(lines) > 0
     path = gc.shortest_path(gc.load_mesh(knot), 3, 700)
-    assert json.loads(Path("path.geojson").read_text())["features"][0]["geometry"] == {
-        "type": "LineString",
-        "coordinates": path.points.tolist(),
-    }
     assert run("path", knot, *commands["path"], "--out", "p.npy").code == 0
     assert np.load("p.npy").tolist() == path.points.tolist()
 
@@ -315,10 +302,9 @@ def test_a_path_by_way_of_others_tells_its_steps(run: Run, plane: Path) -> None:
     expected = gc.shortest_path(gc.load_mesh(plane), 0, 115, [60, 7], explain=True)
     assert expected.steps is not None
 
-    ran = run("path", plane, *ends, "--via", 60, "--via", 7, "--explain", "--out", "p.json")
+    ran = run("steps", plane, *ends, "--via", 60, "--via", 7, "--out", "p.json")
 
     assert (ran.code, ran.err) == (0, "")
-    assert ran.figure("length") == repr(expected.length)
     told = [row for row in ran.out.splitlines() if row.startswith("leg ")]
     assert len(told) == len(expected.steps) == 18
     for row, step in zip(told, expected.steps, strict=True):
@@ -327,7 +313,6 @@ def test_a_path_by_way_of_others_tells_its_steps(run: Run, plane: Path) -> None:
             f"bound {step.bound!r}, {step.windows} windows, {len(step.faces)} faces"
         )
     answer = json.loads(Path("p.json").read_text())
-    assert answer["points"] == expected.points.tolist()
     assert [step["faces"] for step in answer["steps"]] == [
         step.faces.tolist() for step in expected.steps
     ]
@@ -747,10 +732,6 @@ def test_what_fails_says_why_in_one_line(
             "path plane.ply --source 0 --target 1 --out p.obj --method approximate --via 3",
             "--via goes with --method exact only",
         ),
-        (
-            "path plane.ply --source 0 --target 1 --out p.obj --method approximate --explain",
-            "--explain goes with --method exact only",
-        ),
         ("distance plane.ply --source 0 --out d.npy --method fast --effort 3", "'3' is not 1, 2"),
         (
             "distance plane.ply --source 0 --out d.npy --effort 2",
@@ -772,7 +753,7 @@ def test_what_fails_says_why_in_one_line(
         ("distance plane.ply --source 0/x --out d.npy", "'x' is not a point"),
         ("matrix plane.ply --source 0/1 --target 1 --out m.npy", "'0/1' is not a point"),
         ("paths plane.ply --source 0 --out p.obj", "--target"),
-        ("paths plane.ply --source 0 --target 1 --out p.npy", ".geojson or .json"),
+        ("paths plane.ply --source 0 --target 1 --out p.npy", ".csv or .json"),
         (
             "paths plane.ply --source 0 --target 1 --out p.obj --relative-error 0.1",
             "--relative-error goes with --method approximate only",
@@ -791,7 +772,7 @@ def test_what_fails_says_why_in_one_line(
         ("isolines plane.ply --source 0 --out l.obj", "give --count, or --level"),
         ("isolines plane.ply --source 0 --out l.obj --count 2 --level 1", "not both"),
         ("isolines plane.ply --source 0 --out l.obj --count 0", "--count"),
-        ("isolines plane.ply --source 0 --out l.npy --count 1", ".geojson or .json"),
+        ("isolines plane.ply --source 0 --out l.npy --count 1", ".csv or .json"),
         ("path plane.ply --source 0 --target 1 --out p.obj --barriers 3;4", "'3;4' is not a list"),
         ("nearest plane.ply --source 0 --candidate 1 --barriers -3", "--barriers"),
         ("nearest plane.ply --source 0", "--candidate"),

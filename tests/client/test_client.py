@@ -164,6 +164,9 @@ def test_a_mesh_is_stored_read_listed_and_removed(service: Client, tmp_path: Pat
     file.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     stored = service.upload(file)
     assert (stored.name, stored.vertices) == ("one.obj", 3)
+    (listed,) = service.meshes(name="one.obj")
+    assert (listed.id, listed.vertices, listed.faces) == (stored.id, 3, 1)
+    assert service.meshes()[0] == listed, "the newest"
     assert service.upload(file.read_bytes(), format="obj") == service.upload(str(file))
     service.delete_mesh(mesh)
     with pytest.raises(ProblemError) as caught:
@@ -231,14 +234,25 @@ def test_jobs(service: Client, client: TestClient, mesh: Mesh) -> None:
     job = service.jobs()[0]
     assert service.job(job.id) == job
     assert (job.kind, job.status, job.is_finished) == ("distances", "successful", True)
-    assert service.dismiss_job(job).id == job.id
+    assert service.cancel_job(job) == job, "it has finished"
+    service.delete_job(job)
     with pytest.raises(ProblemError, match="job_not_found"):
         service.job(job.id)
 
 
-def test_about_and_estimates(service: Client, mesh: Mesh) -> None:
+def test_about(service: Client) -> None:
     assert "exact" in service.about()["methods"]
-    assert service.estimate(mesh, "distances", {"sources": [0]}).seconds > 0
+
+
+def test_the_steps_of_a_search(service: Client, mesh: Mesh, same: gc.TriangleMesh) -> None:
+    expected = gc.shortest_path(same, 0, 99, [7], explain=True).steps
+    found = service.path_steps(mesh, 0, 99, waypoints=[7])
+    assert expected is not None
+    assert [(each.leg, each.name, each.bound) for each in found] == [
+        (each.leg, each.name, each.bound) for each in expected
+    ]
+    for step, other in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(step.faces, other.faces)
 
 
 def test_coroutines(client: TestClient, mesh: Mesh, service: Client, tmp_path: Path) -> None:

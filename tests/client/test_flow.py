@@ -95,10 +95,9 @@ def long_replies() -> list[httpx2.Response | Exception]:
     return [half, done, httpx2.Response(200, json=ANSWER), done]
 
 
-def stopped() -> list[httpx2.Response | Exception]:
-    """The replies to the two requests that stop a job and remove it."""
-    dismissed = httpx2.Response(200, json=JOB | {"status": "dismissed"})
-    return [dismissed, dismissed]
+def removed() -> httpx2.Response:
+    """The reply to the request that removes a job under way."""
+    return httpx2.Response(200, json=JOB | {"status": "dismissed"})
 
 
 def check_long(service: Service, progress: list[float], pauses: list[float]) -> None:
@@ -161,10 +160,10 @@ def test_a_callback_that_raises_stops_and_removes_the_job() -> None:
     def stop(_share: float) -> None:
         raise KeyboardInterrupt
 
-    service = Service(*long_replies()[:1], *stopped())
+    service = Service(*long_replies()[:1], removed())
     with pytest.raises(KeyboardInterrupt):
         service.client().nearest("m", 0, [1], progress=stop)
-    assert service.sent[1:] == ["DELETE /v1/jobs/7"] * 2
+    assert service.sent[1:] == ["DELETE /v1/jobs/7"]
 
 
 @pytest.mark.parametrize("kind", ["client", "async_client"])
@@ -182,7 +181,7 @@ def test_a_call_that_is_stopped_waits_for_seconds_only(kind: str) -> None:
 
 
 def test_a_cancelled_task_stops_and_removes_its_job(monkeypatch: pytest.MonkeyPatch) -> None:
-    service = Service(*long_replies()[:1], *stopped())
+    service = Service(*long_replies()[:1], removed())
 
     async def cancel_while_it_waits() -> None:
         waiting = asyncio.Event()
@@ -199,7 +198,7 @@ def test_a_cancelled_task_stops_and_removes_its_job(monkeypatch: pytest.MonkeyPa
             await task
 
     asyncio.run(cancel_while_it_waits())
-    assert service.sent[1:] == ["DELETE /v1/jobs/7"] * 2
+    assert service.sent[1:] == ["DELETE /v1/jobs/7"]
 
 
 @pytest.mark.parametrize(("status", "code"), [(429, "rate_limited"), (503, "queue_full")])
@@ -232,10 +231,10 @@ def test_a_call_does_not_wait_for_hours(monkeypatch: pytest.MonkeyPatch) -> None
 def test_what_a_service_may_have_removed_is_not_removed_again(
     broken: httpx2.TransportError, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A mesh would not be found, and a job that was only stopped would be removed."""
+    """It would not be found."""
     monkeypatch.setattr("tenacity.nap.time.sleep", lambda _: None)
     done = httpx2.Response(200, json=JOB)
-    for name in ("delete_mesh", "dismiss_job"):
+    for name in ("delete_mesh", "delete_job"):
         once = Service(broken, done)
         with pytest.raises(UnreachableError, match="no answer"):
             getattr(once.client(), name)("7")

@@ -36,7 +36,7 @@ import sys
 from generated import Client
 from generated.api.meshes import create_mesh
 from generated.api.queries import compute_path
-from generated.models import CreateMeshSample, Estimate, MeshDocument, PathAnswer, PathRequest
+from generated.models import CreateMeshSample, MeshDocument, PathAnswer, PathRequest
 
 client = Client(base_url=sys.argv[1])
 mesh = create_mesh.sync(client=client, sample=CreateMeshSample.PLANE, faces=200)
@@ -45,8 +45,6 @@ question = PathRequest(source=0, target=120)
 path = compute_path.sync(mesh.id, client=client, body=question)
 assert isinstance(path, PathAnswer)
 print(path.length)
-cost = compute_path.sync(mesh.id, client=client, body=question, estimate=True)
-assert isinstance(cost, Estimate)
 """
 
 

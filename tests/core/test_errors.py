@@ -12,6 +12,7 @@ from geodesic_core import errors
 EACH = [
     errors.InvalidMesh("an edge is too short", kind="edge", elements=[(3, 4)]),
     errors.TooManyFaces(7, 6),
+    errors.TooManyVertices(7, 6),
     errors.UnknownFileType("unknown mesh file type"),
     errors.FileTooLarge(100),
     errors.InvalidPoint("the point is vertex 9"),

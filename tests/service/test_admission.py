@@ -9,6 +9,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.http.middleware import admission
+from app.http.server import server_of
 from app.main import create_app
 from app.settings import Settings
 from tests.support.processes import stopped
@@ -224,11 +225,11 @@ def test_openapi_declares_the_scheme(keyed: TestClient) -> None:
 def test_rate_limit(tmp_path: Path) -> None:
     client = limited(tmp_path, rate_limit=2)
 
-    assert client.get("/v1").json()["limits"]["GEODESIC_RATE_LIMIT"] == 2
+    assert client.get("/v1").json()["limits"]["rate_limit"] == 2
     assert client.get("/v1").status_code == 200
     response = client.get("/v1")
     problem = check_problem(response, 429, "rate_limited")
-    assert (problem["limit"], problem["setting"]) == (2, "GEODESIC_RATE_LIMIT")
+    assert (problem["limit"], problem["setting"]) == (2, "rate_limit")
     assert 1 <= int(response.headers["retry-after"]) <= 30
     for _ in range(5):
         assert client.get("/livez").status_code == 200
@@ -243,6 +244,24 @@ def test_addresses_have_rates_of_their_own(tmp_path: Path) -> None:
     forged = {"X-Forwarded-For": "10.9.9.9", "Forwarded": "for=10.9.9.9"}
     assert one.get("/v1", headers=forged).status_code == 429
     assert other.get("/v1").status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("trusted", "statuses"),
+    [("", [200, 429, 429]), ("10.0.0.1", [200, 429, 429]), ("127.0.0.0/8", [200, 200, 200])],
+)
+def test_only_a_trusted_proxy_names_the_caller(
+    tmp_path: Path, trusted: str, statuses: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else every process of this machine would have as many names as it likes."""
+    monkeypatch.setenv("GEODESIC_TRUSTED_PROXIES", trusted)
+    monkeypatch.setenv("FORWARDED_ALLOW_IPS", "*")  # uvicorn's
+    settings = Settings(store=tmp_path, workers=1, rate_limit=1)
+    config = server_of(create_app(settings), "127.0.0.1", 0, settings).config
+    config.load()
+    client = TestClient(config.loaded_app, client=("127.0.0.1", 1))
+    headers = [{"X-Forwarded-For": f"10.9.9.{i}"} for i in range(3)]
+    assert [client.get("/v1", headers=each).status_code for each in headers] == statuses
 
 
 def test_keys_have_rates_of_their_own_wherever_they_come_from(tmp_path: Path) -> None:
@@ -267,7 +286,7 @@ def test_requests_at_the_same_time(tmp_path: Path) -> None:
             response = client.get("/v1")
             problem = check_problem(response, 429, "rate_limited")
             assert (problem["limit"], problem["actual"]) == (1, 2)
-            assert problem["setting"] == "GEODESIC_MAX_CONCURRENT"
+            assert problem["setting"] == "max_concurrent"
             assert response.headers["retry-after"] == "1"
             assert client.get("/livez").status_code == 200
 

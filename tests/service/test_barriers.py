@@ -89,7 +89,7 @@ def test_spellings_of_barriers_are_one_query(
         )
         for barriers in ([3, 1], [1, 3, 3], [1])
     ]
-    keys = [result_key(query, "a/b") for query in queries]
+    keys = [result_key(query) for query in queries]
     assert keys[0] == keys[1] != keys[2]
     assert queries[0].barriers.tolist() == [1, 3]
 
@@ -131,23 +131,21 @@ def test_points_inside_barriers_are_refused(client: TestClient, plane: str) -> N
     across = {"edge": [5, 17], "t": 0.5}
     near = {"position": [0.55, 0.05, 0], "max_distance": 1e-3}
 
-    for query in ("", "?estimate=true"):
-        refused = ask(
-            client,
-            plane,
-            "matrix",
-            query,
-            barriers=WALL,
-            sources=[inside, {"vertex": u}, {"edge": [u, v], "t": 0}],
-            targets=[across, near],
-        )
-        problem = check_problem(refused, 422, "invalid_point")
-        assert [fault["pointer"] for fault in problem["errors"]] == [
-            "/sources/0/barycentric",
-            "/targets/0/edge",
-            "/targets/1/position",
-        ]
-        assert "blocked" in problem["errors"][0]["message"]
+    refused = ask(
+        client,
+        plane,
+        "matrix",
+        barriers=WALL,
+        sources=[inside, {"vertex": u}, {"edge": [u, v], "t": 0}],
+        targets=[across, near],
+    )
+    problem = check_problem(refused, 422, "invalid_point")
+    assert [fault["pointer"] for fault in problem["errors"]] == [
+        "/sources/0/barycentric",
+        "/targets/0/edge",
+        "/targets/1/position",
+    ]
+    assert "blocked" in problem["errors"][0]["message"]
 
 
 @pytest.mark.parametrize("operation", QUERIES)
@@ -169,10 +167,9 @@ def test_points_inside_barriers_are_refused(client: TestClient, plane: str) -> N
 def test_refused_barriers(
     client: TestClient, plane: str, operation: str, barriers: Any, places: list[str]
 ) -> None:
-    for query in ("", "?estimate=true"):
-        refused = ask(client, plane, operation, query, barriers=barriers)
-        problem = check_problem(refused, 422, "invalid_request")
-        assert [fault["pointer"] for fault in problem["errors"]] == places
+    refused = ask(client, plane, operation, barriers=barriers)
+    problem = check_problem(refused, 422, "invalid_request")
+    assert [fault["pointer"] for fault in problem["errors"]] == places
 
 
 def test_positions_are_located_without_barriers(client: TestClient, plane: str) -> None:
@@ -180,15 +177,6 @@ def test_positions_are_located_without_barriers(client: TestClient, plane: str) 
         f"/v1/meshes/{plane}/locate", json={"points": [[0, 0, 0]], "barriers": [0]}
     )
     check_problem(refused, 422, "invalid_request")
-
-
-def test_an_estimate_counts_the_blocked_mesh(client: TestClient, plane: str) -> None:
-    estimated = ask(client, plane, "distances", "?estimate=true", barriers=WHOLE_WALL).json()
-    real = ask(client, plane, "distances", barriers=WHOLE_WALL)
-
-    assert estimated["response_bytes"] == pytest.approx(len(real.content), rel=0.05)
-    free = ask(client, plane, "distances", "?estimate=true").json()
-    assert estimated["seconds"] >= free["seconds"] > 0
 
 
 @pytest.mark.filterwarnings("ignore::geodesic_core.errors.BlockedSource")

@@ -122,19 +122,18 @@ def test_barriers_part_a_curve_from_what_is_behind(client: TestClient, plane: st
 def test_refused_curves(
     client: TestClient, plane: str, polyline: Any, code: str, places: list[str]
 ) -> None:
-    for query in ("", "?estimate=true"):
-        field = client.post(
-            f"/v1/meshes/{plane}/distances{query}",
-            json={"sources": [{"vertex": 0}, {"polyline": polyline}]},
-        )
-        for response, where in (
-            (field, "/sources/1"),
-            (paths(client, plane, query, source={"polyline": polyline}), "/source"),
-        ):
-            problem = check_problem(response, 422, code)
-            assert [fault["pointer"] for fault in problem["errors"]] == [
-                f"{where}/polyline{place}" for place in places
-            ]
+    field = client.post(
+        f"/v1/meshes/{plane}/distances",
+        json={"sources": [{"vertex": 0}, {"polyline": polyline}]},
+    )
+    for response, where in (
+        (field, "/sources/1"),
+        (paths(client, plane, source={"polyline": polyline}), "/source"),
+    ):
+        problem = check_problem(response, 422, code)
+        assert [fault["pointer"] for fault in problem["errors"]] == [
+            f"{where}/polyline{place}" for place in places
+        ]
 
 
 def test_curves_are_sources_of_sweeps_only(client: TestClient, plane: str) -> None:

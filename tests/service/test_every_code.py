@@ -111,7 +111,7 @@ def not_finished(site: Site) -> Any:
 
 def dismissed(site: Site) -> Any:
     with site.job() as job:
-        site.client.delete(job)
+        site.client.post(f"{job}/cancel")
         return site.client.get(f"{job}/results")
 
 
@@ -230,6 +230,7 @@ def on_a_connection(data: bytes, **limits: int) -> Callable[[Site], Any]:
 
 PROVOKED: dict[str, Callable[[Site], Any]] = {
     "malformed_body": lambda site: site.send("{"),
+    "idempotency_key_unused": lambda site: site.ask(site.small, {"Idempotency-Key": "k"}),
     "malformed_request": on_a_connection(b"nonsense\r\n\r\n"),
     "unauthorized": lambda site: site.client.get("/v1", headers={"Authorization": "Bearer no"}),
     "forbidden": lambda site: site.client.delete(f"/v1/meshes/{site.small}", headers=BOB),

@@ -46,7 +46,7 @@ def test_distances_are_the_library_s(client: TestClient, knot: str, effort: int)
     np.testing.assert_array_equal(answer["distances"], field.distances)
     np.testing.assert_array_equal(answer["nearest_source"], field.nearest_source)
     np.testing.assert_array_equal(np.array(answer["gradient"], float), field.gradient)
-    assert (answer["method"], answer["exact"]) == ("fast", False)
+    assert answer["method"] == "fast"
     value = field.error_bound.value
     assert answer["error_bound"] == {"type": "relative", "value": value, "kind": "estimated"}
     assert answer["stats"]["windows_kept"] == field.stats.windows_kept
@@ -126,7 +126,7 @@ def test_headers_of_binary_distances(client: TestClient, knot: str, name: str) -
     response = client.post(link, params={"format": name}, json=body)
 
     headers = response.headers
-    assert (headers["geodesic-method"], headers["geodesic-exact"]) == ("fast", "false")
+    assert headers["geodesic-method"] == "fast"
     assert json.loads(headers["geodesic-error-bound"]) == answer["error_bound"]
     values = np.frombuffer(response.content[-8 * len(answer["distances"]) :], "<f8")
     np.testing.assert_array_equal(values, answer["distances"])
@@ -143,7 +143,7 @@ def test_a_path_is_no_longer_than_its_distance(client: TestClient, knot: str, ef
 
     answer = ask(client, knot, "path", **ENDS, effort=effort).json()
 
-    assert (answer["status"], answer["method"], answer["exact"]) == ("ok", "fast", False)
+    assert (answer["status"], answer["method"]) == ("ok", "fast")
     assert answer["length"] == expected.length
     np.testing.assert_array_equal(answer["points"], expected.points)
     assert exact * (1 - ROUNDING) <= answer["length"]
@@ -165,14 +165,12 @@ def test_paths_to_many_are_those_to_each(client: TestClient, knot: str) -> None:
 def test_get_answers_as_post_and_is_cached(client: TestClient, knot: str) -> None:
     link = f"/v1/meshes/{knot}/path?from=v3&to=v700"
 
-    got = client.get(f"{link}&method=fast&effort=4")
+    got = client.get(f"{link}&method=fast")
 
-    assert got.json() == ask(client, knot, "path", **ENDS, effort=4).json()
-    same = client.get(
-        f"{link}&method=fast&effort=4", headers={"If-None-Match": got.headers["etag"]}
-    )
+    assert got.json() == ask(client, knot, "path", **ENDS, effort=2).json()
+    same = client.get(f"{link}&method=fast", headers={"If-None-Match": got.headers["etag"]})
     assert same.status_code == 304
-    for other in ("", "&method=approximate", "&method=fast", "&method=fast&effort=8"):
+    for other in ("", "&method=approximate"):
         response = client.get(link + other, headers={"If-None-Match": got.headers["etag"]})
         assert response.status_code == 200
         assert response.headers["etag"] != got.headers["etag"]
@@ -246,29 +244,17 @@ def test_refused_efforts(client: TestClient, knot: str, body: dict, names: list[
         assert [fault["pointer"] for fault in problem["errors"]] == [f"/{name}" for name in names]
 
 
-@pytest.mark.parametrize(
-    "query", ["method=fast&effort=3", "method=fast&effort=", "effort=2", "method=exact&effort=2"]
-)
-def test_refused_efforts_of_a_get(client: TestClient, knot: str, query: str) -> None:
-    response = client.get(f"/v1/meshes/{knot}/path?from=v3&to=v700&{query}")
-
-    problem = check_problem(response, 422, "invalid_request")
-    assert [fault["pointer"] for fault in problem["errors"]] == ["/query/effort"]
-
-
 def test_an_effort_is_refused_with_a_reason(client: TestClient, knot: str) -> None:
     problem = distances(client, knot, sources=SOURCES, effort=2).json()
 
     assert "method 'fast' only" in problem["detail"]
 
 
-@pytest.mark.parametrize("option", [{"waypoints": [{"vertex": 9}]}, {"explain": True}])
-def test_options_of_exact_paths_are_refused(
-    client: TestClient, knot: str, option: dict[str, Any]
-) -> None:
-    problem = check_problem(ask(client, knot, "path", **ENDS, **option), 422, "invalid_request")
+def test_waypoints_are_of_exact_paths(client: TestClient, knot: str) -> None:
+    response = ask(client, knot, "path", **ENDS, waypoints=[{"vertex": 9}])
+    problem = check_problem(response, 422, "invalid_request")
 
-    assert [fault["pointer"] for fault in problem["errors"]] == [f"/{next(iter(option))}"]
+    assert [fault["pointer"] for fault in problem["errors"]] == ["/waypoints"]
     assert "method 'exact' only" in problem["detail"]
 
 

@@ -4,7 +4,6 @@ import csv
 import json
 from io import BytesIO, StringIO
 from typing import Any
-from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -16,13 +15,13 @@ from tests.support.service import check_problem, upload_sample
 
 OFFERED = {
     "distances": "json npy octets csv ply",
-    "path": "json npy octets obj csv svg geojson",
-    "paths": "json obj csv svg geojson",
-    "isolines": "json obj csv svg geojson",
-    "borders": "json obj csv svg geojson",
+    "path": "json npy octets obj csv",
+    "paths": "json obj csv",
+    "isolines": "json obj csv",
+    "borders": "json obj csv",
     "matrix": "json npy octets csv",
-    "nearest": "json csv geojson",
-    "locate": "json csv geojson",
+    "nearest": "json csv",
+    "locate": "json csv",
 }
 BODIES: dict[str, dict[str, Any]] = {
     "distances": {"sources": [{"vertex": 0}, {"vertex": 7}]},
@@ -46,11 +45,8 @@ MEDIA_TYPES = {
     "obj": "model/obj",
     "ply": "model/ply",
     "csv": "text/csv; charset=utf-8",
-    "svg": "image/svg+xml",
-    "geojson": "application/geo+json",
 }
 POINT = ("x", "y", "z")
-SVG = "{http://www.w3.org/2000/svg}"
 
 
 @pytest.fixture(scope="module")
@@ -91,23 +87,6 @@ def polylines_of(text: str) -> list[tuple[str, list[list[float]]]]:
             case _:
                 raise AssertionError(row)
     return found
-
-
-def drawing_of(response: Any) -> tuple[list[float], list[tuple[Any, list[list[float]]]]]:
-    """Return the picture's box, and the elements of an SVG, with their points, y upwards."""
-    root = ET.fromstring(response.content)  # noqa: S314 - our own
-    assert root.tag == f"{SVG}svg"
-    box = [float(x) for x in root.attrib["viewBox"].split()]
-    found = []
-    for element in root:
-        if element.tag != f"{SVG}desc":
-            pairs = [pair.split(",") for pair in element.attrib["points"].split()]
-            found.append((element, [[float(x), -float(y)] for x, y in pairs]))
-    return box, found
-
-
-def flat(points: list[list[float]]) -> list[list[float]]:
-    return [point[:2] for point in points]
 
 
 @pytest.mark.parametrize("kind", OFFERED)
@@ -264,45 +243,12 @@ def test_a_path_in_each_format_is_the_same(client: TestClient, knot: str) -> Non
     assert "geodesic-locations" not in table.headers
     assert "geodesic-omitted" not in table.headers
 
-    collection = ask(client, knot, "path", "geojson", **body).json()
-    (feature,) = collection["features"]
-    assert collection["type"] == "FeatureCollection"
-    assert "those of the mesh" in collection["units"]
-    assert not {"coordinates", "geometry", "geometries", "properties"} & set(collection), "RFC 7946"
-    assert collection["target"] == answer["target"]
-    assert feature["type"] == "Feature"
-    assert feature["geometry"] == {"type": "LineString", "coordinates": points}
-    assert feature["properties"] == {"status": "ok", "length": answer["length"]}
-
-    box, ((element, drawn),) = drawing_of(ask(client, knot, "path", "svg", **body))
-    assert element.tag == f"{SVG}polyline"
-    assert drawn == flat(points)
-    assert float(element.attrib["data-length"]) == answer["length"]
-    check_box(box, drawn)
-
-
-def check_box(box: list[float], drawn: list[list[float]]) -> None:
-    """Check that a picture holds what is drawn, with a margin of 2 % and no more."""
-    left, top, width, height = box
-    low, high = np.min(drawn, axis=0), np.max(drawn, axis=0)
-    margin = 0.02 * (high - low).max()
-    np.testing.assert_allclose([left, left + width], [low[0] - margin, high[0] + margin])
-    np.testing.assert_allclose([top, top + height], [-high[1] - margin, -low[1] + margin])
-
 
 def test_a_path_to_where_it_starts_is_a_point(client: TestClient, plane: str) -> None:
     body = {"source": {"vertex": 7}, "target": {"vertex": 7}}
     (point,) = ask(client, plane, "path", "json", **body).json()["points"]
     assert polylines_of(ask(client, plane, "path", "obj", **body).text) == [("", [point])]
     assert "p 1" in ask(client, plane, "path", "obj", **body).text
-    (feature,) = ask(client, plane, "path", "geojson", **body).json()["features"]
-    assert feature["geometry"] == {"type": "Point", "coordinates": point}
-    (left, top, width, height), ((_, drawn),) = drawing_of(
-        ask(client, plane, "path", "svg", **body)
-    )
-    assert drawn == [point[:2]] * 2
-    assert left < point[0] < left + width
-    assert top < -point[1] < top + height
 
 
 def test_members_too_long_for_a_header_are_named(client: TestClient, knot: str) -> None:
@@ -317,7 +263,7 @@ def test_members_too_long_for_a_header_are_named(client: TestClient, knot: str) 
 
 def test_where_there_is_no_path_each_format_says_why(client: TestClient, apart: str) -> None:
     body = {"source": {"vertex": 0}, "target": {"vertex": 4}}
-    for name in ("npy", "octets", "obj", "csv", "svg", "geojson"):
+    for name in ("npy", "octets", "obj", "csv"):
         response = ask(client, apart, "path", name, **body)
         assert response.headers["geodesic-status"] == "no_path"
         assert response.headers["geodesic-reason"] == "disconnected"
@@ -326,10 +272,6 @@ def test_where_there_is_no_path_each_format_says_why(client: TestClient, apart: 
     (row,) = rows_of(ask(client, apart, "path", "csv", **body))
     assert row.pop("status") == "disconnected"
     assert not any(row.values())
-    (feature,) = ask(client, apart, "path", "geojson", **body).json()["features"]
-    assert feature["geometry"] is None
-    assert feature["properties"] == {"status": "disconnected", "length": None}
-    assert drawing_of(ask(client, apart, "path", "svg", **body)) == ([0, 0, 1, 1], [])
 
 
 def test_paths_have_names_also_those_that_are_not_there(client: TestClient, apart: str) -> None:
@@ -346,16 +288,6 @@ def test_paths_have_names_also_those_that_are_not_there(client: TestClient, apar
         assert numbers([row for row in rows if row["path"] == str(i)], *POINT) == points
     (row,) = (row for row in rows if row["path"] == "1")
     assert (row["status"], row["x"], row["face"]) == ("disconnected", "", "")
-
-    features = ask(client, apart, "paths", "geojson", **body).json()["features"]
-    assert [feature["properties"]["path"] for feature in features] == [0, 1, 2]
-    assert features[1]["geometry"] is None
-    assert features[2]["geometry"]["coordinates"] == there[1][1]
-
-    _, drawn = drawing_of(ask(client, apart, "paths", "svg", **body))
-    assert [(int(element.attrib["data-path"]), points) for element, points in drawn] == [
-        (i, flat(points)) for i, points in there
-    ]
 
 
 def test_isolines_closed_open_and_none(client: TestClient, plane: str) -> None:
@@ -383,30 +315,11 @@ def test_isolines_closed_open_and_none(client: TestClient, plane: str) -> None:
     assert [[row["level"], row["line"], row["closed"]] for row in rows[:-1]] == told_of_points
     assert rows[-1] == dict.fromkeys(rows[0], "") | {"level": "9.0"}
 
-    *features, last = ask(client, plane, "isolines", "geojson").json()["features"]
-    assert [feature["geometry"]["coordinates"] for feature in features] == ends
-    for feature, (level, line) in zip(features, lines, strict=True):
-        expected = {name: line[name] for name in ("line", "closed", "length")}
-        assert feature["properties"] == {"level": level, **expected}
-    assert last["geometry"] is None
-    assert last["properties"] == {"level": 9.0, "line": None, "closed": None, "length": None}
-
-    box, drawn = drawing_of(ask(client, plane, "isolines", "svg"))
-    assert [each for _, each in drawn] == [flat(line["points"]) for _, line in lines]
-    for (element, _), (level, line) in zip(drawn, lines, strict=True):
-        assert element.tag == (f"{SVG}polygon" if line["closed"] else f"{SVG}polyline")
-        assert float(element.attrib["data-level"]) == level
-    assert len({element.attrib["stroke"] for element, _ in drawn}) == 2, "a colour for each level"
-    check_box(box, flat(points))
-
 
 def test_levels_that_nothing_is_at(client: TestClient, plane: str) -> None:
     body = {"sources": [{"vertex": 0}], "levels": [8.0, 9.0]}
     assert polylines_of(ask(client, plane, "isolines", "obj", **body).text) == []
     assert numbers(rows_of(ask(client, plane, "isolines", "csv", **body)), "level") == [8.0, 9.0]
-    features = ask(client, plane, "isolines", "geojson", **body).json()["features"]
-    assert [feature["geometry"] for feature in features] == [None, None]
-    assert drawing_of(ask(client, plane, "isolines", "svg", **body))[1] == []
 
 
 # Tables
@@ -445,8 +358,7 @@ def test_nearest_and_located_points(client: TestClient, plane: str) -> None:
         answer = ask(client, plane, kind, "json").json()[members]
         answer = [{index: i} | each if each else {index: i} for i, each in enumerate(answer)]
         rows = rows_of(ask(client, plane, kind, "csv"))
-        features = ask(client, plane, kind, "geojson").json()["features"]
-        for expected, row, feature in zip(answer, rows, features, strict=True):
+        for expected, row in zip(answer, rows, strict=True):
             (found,) = numbers([row], *row)
             found = dict(zip(row, found, strict=True))
             assert found[index] == expected[index]
@@ -457,19 +369,13 @@ def test_nearest_and_located_points(client: TestClient, plane: str) -> None:
                 expected.get("face"),
             )
             assert [found[x] for x in "uvw"] == expected.get("barycentric", [None] * 3)
-            position = expected.pop("position", None)
-            point = {"type": "Point", "coordinates": position}
-            assert feature["geometry"] == (point if position else None)
-            assert feature["properties"] == expected
-    assert features[1]["geometry"] is None, "it misses"
+    assert rows[1]["x"] == "", "it misses"
 
 
 def test_no_candidate_within_reach(client: TestClient, apart: str) -> None:
     body = {"source": {"vertex": 0}, "candidates": [{"vertex": 4}]}
     assert rows_of(ask(client, apart, "nearest", "csv", **body)) == []
-    response = ask(client, apart, "nearest", "geojson", **body)
-    assert response.json()["features"] == []
-    assert response.json()["unreachable"]["disconnected"] == 1
+    assert ask(client, apart, "nearest", "json", **body).json()["unreachable"]["disconnected"] == 1
 
 
 # Narrow numbers

@@ -185,7 +185,7 @@ def test_dismissing_stops_running_work(one: ServiceClient, slow: str) -> None:
     with stopped(workers):  # else it may end before another replica, which runs it, knows
         job = job_of(submit(one, slow))
         wait_for(one, job, "running")
-        response = one.delete(job)
+        response = one.post(f"{job}/cancel")
         wait_until(lambda: one.load.cancelled == cancelled + 1)
     one.wait_until_idle()
 
@@ -193,6 +193,35 @@ def test_dismissing_stops_running_work(one: ServiceClient, slow: str) -> None:
     assert (response.status_code, response.json()["status"]) == (200, "dismissed")
     assert one.get(job).json()["status"] == "dismissed"
     check_problem(one.get(f"{job}/results"), 410, "job_dismissed")
+
+
+def test_cancelling_a_finished_job_leaves_it_its_answer(one: ServiceClient, small: str) -> None:
+    """A client that only wanted to stop it comes too late now and then, or asks twice."""
+    job = job_of(submit(one, small))
+    last = wait_for(one, job, "successful")
+    for _ in range(2):
+        answer = one.post(f"{job}/cancel")
+        assert (answer.status_code, answer.json()) == (200, last)
+    assert one.get(f"{job}/results").status_code == 200
+    check_problem(one.post("/v1/jobs/none/cancel"), 404, "job_not_found")
+
+
+def test_cancelling_twice_leaves_the_record(one: ServiceClient, slow: str) -> None:
+    with stopped(one.workers()):
+        job = job_of(submit(one, slow))
+        for _ in range(2):
+            assert one.post(f"{job}/cancel").json()["status"] == "dismissed"
+        assert one.get(job).json()["status"] == "dismissed"
+
+
+def test_deleting_a_job_that_runs_stops_and_removes_it(one: ServiceClient, slow: str) -> None:
+    cancelled = one.load.cancelled
+    with stopped(one.workers()):
+        job = job_of(submit(one, slow))
+        wait_for(one, job, "running")
+        assert one.delete(job).json()["status"] == "dismissed"
+        check_problem(one.get(job), 404, "job_not_found")
+        wait_until(lambda: one.load.cancelled == cancelled + 1)
 
 
 def test_deleting_a_finished_job_removes_it(one: ServiceClient, small: str) -> None:
@@ -208,6 +237,18 @@ def test_deleting_a_finished_job_removes_it(one: ServiceClient, small: str) -> N
 def test_jobs_that_are_not_there(one: ServiceClient, job_id: str) -> None:
     for path in (f"/v1/jobs/{job_id}", f"/v1/jobs/{job_id}/results", f"/v1/jobs/{job_id}/events"):
         assert one.get(path).json()["code"] in ("job_not_found", "not_found")
+
+
+def test_a_key_where_no_job_is_made_is_refused(one: ServiceClient, small: str) -> None:
+    key = {"Idempotency-Key": "unused"}
+    body = {"sources": [{"vertex": 0}]}
+    for refused in (
+        one.post(f"/v1/meshes/{small}/distances", json=body, headers=key),
+        one.get(f"/v1/meshes/{small}/path?from=0&to=1", headers=key),
+        one.post("/v1/meshes?sample=plane", headers=key),
+    ):
+        problem = check_problem(refused, 400, "idempotency_key_unused")
+        assert "Prefer: respond-async" in problem["detail"]
 
 
 def test_jobs_are_listed_the_newest_first(one: ServiceClient, small: str) -> None:
@@ -278,7 +319,7 @@ def test_a_job_that_began_as_a_wait_is_stopped_like_any_other(
     before = engine.load.cancelled
     with stopped(one.workers()):
         job = job_of(submit(one, small, waiting(1)))
-        assert one.delete(job).json()["status"] == "dismissed"
+        assert one.post(f"{job}/cancel").json()["status"] == "dismissed"
     wait_until(lambda: engine.load.cancelled == before + 1)
 
 
@@ -299,10 +340,11 @@ def test_a_wait_that_is_no_number_of_seconds_is_ignored(
     assert submit(one, small, waiting(seconds)).status_code == 202
 
 
+@pytest.mark.usefixtures("held_workers")
 def test_the_key_of_a_dismissed_job_can_be_sent_again(one: ServiceClient, small: str) -> None:
-    body = {"sources": [{"vertex": 3}]}
+    body = {"sources": [{"vertex": 3, "start_distance": 0.7}]}
     job = job_of(submit(one, small, {"Idempotency-Key": "k3"}, **body))
-    one.delete(job)
+    one.post(f"{job}/cancel")
 
     assert job_of(submit(one, small, {"Idempotency-Key": "k3"}, **body)) != job
 
@@ -386,15 +428,17 @@ def test_a_job_has_a_deadline_of_its_own(tmp_path: Path) -> None:
             problem = wait_for(client, job, "failed")["problem"]
 
         assert problem["code"] == "deadline_exceeded"
-        assert (problem["limit"], problem["setting"]) == (0.3, "GEODESIC_JOB_DEADLINE_S")
+        assert (problem["limit"], problem["setting"]) == (0.3, "job_deadline_s")
 
 
 def test_jobs_are_forgotten_after_a_while(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     clock = Clock()
     monkeypatch.setattr("app.jobs.retention.monotonic", clock)
-    with serving(tmp_path, job_ttl=0.1, results_bytes=1) as client:
-        job = job_of(submit(client, upload_sample(client, "plane", 50)))
+    with serving(tmp_path, job_ttl=0.1, results_bytes=300) as client:
+        mesh_id = upload_sample(client, "plane", 50)  # 36 distances, in JSON larger than expected
+        job = job_of(submit(client, mesh_id))
         assert wait_for(client, job, "failed")["problem"]["code"] == "storage_full"
+        check_problem(submit(client, upload_sample(client, "plane", 200)), 507, "storage_full")
         clock.now += 1
         wait_until(lambda: client.get(job).status_code == 404)
 
@@ -505,7 +549,7 @@ def test_jobs_are_dismissed_although_the_disk_is_full(
             for job in finished:
                 assert client.delete(job).status_code == 200
                 check_problem(client.get(job), 404, "job_not_found")
-            assert client.delete(running).json()["status"] == "dismissed"
+            assert client.post(f"{running}/cancel").json()["status"] == "dismissed"
             check_problem(submit(client, mesh_id), 507, "storage_full")
     monkeypatch.undo()
     with serving(tmp_path) as client:

@@ -1,10 +1,14 @@
 import bz2
 import gzip
 import json
+import tempfile
+import threading
 import zipfile
+from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
-from typing import get_args
+from random import Random
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -17,7 +21,14 @@ from app.settings import Settings
 from app.store.manifests import MANIFEST, encode_manifest, read_manifest
 from geodesic_core import samples
 from geodesic_core.io.load import _READERS
-from tests.support.service import check_problem, serving, store_mesh, stored_mesh, upload_sample
+from tests.support.service import (
+    ServiceClient,
+    check_problem,
+    serving,
+    store_mesh,
+    stored_mesh,
+    upload_sample,
+)
 
 
 def zipped(name: str, content: str) -> bytes:
@@ -208,7 +219,8 @@ def test_the_name_of_a_mesh_comes_with_its_first_upload(
         assert document["name"] == name
         assert client.post("/v1/meshes", **again).json() == document
     with serving(tmp_path) as client:
-        assert client.get("/v1/meshes").json()["meshes"] == [document]
+        (listed,) = client.get("/v1/meshes").json()["meshes"]
+        assert listed.items() <= document.items()
 
 
 def test_a_mesh_that_an_earlier_release_stored_has_no_name(tmp_path: Path) -> None:
@@ -470,7 +482,8 @@ def test_refused_uploads(client: TestClient, upload: dict, status: int, code: st
 def test_a_compressed_body_is_bounded_by_what_it_holds(tmp_path: Path, excess: int) -> None:
     """A megabyte can hold a gigabyte; no more than the limit is ever written."""
     limit = 3 * 2**20
-    content = OBJ.encode().ljust(limit + excess, b"\n")
+    noise = b"\n#" + Random(1).randbytes(limit).hex().encode()
+    content = (OBJ.encode() + noise)[: limit + excess]
     with serving(tmp_path, max_upload_bytes=limit, max_query_bytes=100) as client:
         response = client.post("/v1/meshes", content=gzip.compress(content), headers=GZIPPED)
         if not excess:
@@ -478,8 +491,77 @@ def test_a_compressed_body_is_bounded_by_what_it_holds(tmp_path: Path, excess: i
             return
         problem = check_problem(response, 413, "upload_too_large")
         assert problem["limit"] == limit
-        assert problem["setting"] == "GEODESIC_MAX_UPLOAD_BYTES"
+        assert problem["setting"] == "max_upload_bytes"
         assert client.get("/v1/meshes").json()["meshes"] == []
+
+
+BOMB = gzip.compress(b"#" * 10**7)
+
+
+@pytest.mark.parametrize(
+    "upload",
+    [
+        {"content": BOMB, "headers": GZIPPED},
+        {"content": BOMB, "headers": TYPE_OBJ},
+        {"content": zipped("a.obj", "#" * 10**7), "headers": TYPE_OBJ},
+    ],
+    ids=["coding", "gzip", "zip"],
+)
+def test_a_packed_file_may_not_grow_a_thousandfold(
+    client: TestClient, upload: dict[str, Any]
+) -> None:
+    """Ten kilobytes would cost as much as ten megabytes."""
+    problem = check_problem(client.post("/v1/meshes", **upload), 413, "upload_too_large")
+    assert problem["limit"] == 2**20 + 100 * len(upload["content"]) < 10**7
+
+
+def test_ratios_do_not_multiply(client: TestClient) -> None:
+    twice = gzip.compress(gzip.compress(OBJ.encode()))
+    response = client.post("/v1/meshes", content=twice, headers=GZIPPED)
+    assert "so is the body" in check_problem(response, 415, "unsupported_media_type")["detail"]
+
+
+def test_an_upload_without_room_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    """So is one that would wait for a worker without room."""
+
+    def never() -> Iterator[bytes]:
+        pytest.fail("the body is read")
+        yield b""
+
+    def post(client: ServiceClient) -> Any:
+        headers = {**TYPE_OBJ, "Content-Length": "1000"}
+        return client.post("/v1/meshes", content=never(), headers=headers)
+
+    with serving(tmp_path) as client:
+        client.app.state.service.scratch.change("somebody", 8 * 512 * 2**20 - 999)
+        problem = check_problem(post(client), 503, "queue_full")
+        assert problem["setting"] == "scratch_bytes"
+        client.app.state.service.scratch.change("somebody", 999 - 8 * 512 * 2**20)
+        client.engine.drain()
+        check_problem(post(client), 503, "draining")
+
+
+def test_all_of_an_upload_is_in_the_store(client: ServiceClient, tmp_path: Path) -> None:
+    """The system's temporary folder may be in memory, beyond all limits."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tempfile, "tempdir", str(tmp_path / "missing"))
+        response = client.post("/v1/meshes", files={"file": ("a.obj", OBJ + "#" * 2 * 2**20)})
+    assert response.status_code in (200, 201)
+
+
+def test_vertices_have_a_limit(tmp_path: Path) -> None:
+    """Those without a face count: a few bytes each, when packed, and as costly as others."""
+    text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    rows = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 2, 2]]
+    with serving(tmp_path, max_vertices=3) as client:
+        assert client.post("/v1/meshes", content=text, headers=TYPE_OBJ).status_code == 201
+        for more in (
+            {"content": text + "v 2 2 2\n", "headers": TYPE_OBJ},
+            {"json": {"vertices": rows, "faces": [[0, 1, 2]]}},
+            {"params": {"sample": "sphere", "faces": 20}},
+        ):
+            problem = check_problem(client.post("/v1/meshes", **more), 422, "limit_exceeded")
+            assert (problem["limit"], problem["setting"]) == (3, "max_vertices")
 
 
 def test_limits_of_uploads(tmp_path: Path) -> None:
@@ -488,14 +570,14 @@ def test_limits_of_uploads(tmp_path: Path) -> None:
             client.post("/v1/meshes", params={"format": "off"}, content=OFF), 422, "limit_exceeded"
         )
         assert (many["limit"], many["actual"]) == (3, 4)
-        assert many["setting"] == "GEODESIC_MAX_FACES"
+        assert many["setting"] == "max_faces"
         assert client.get("/v1/meshes").json()["meshes"] == []
 
         large = OFF + "#" * 200
         declared = client.post("/v1/meshes", params={"format": "off"}, content=large)
         problem = check_problem(declared, 413, "upload_too_large")
         assert (problem["limit"], problem["actual"]) == (200, len(large))
-        assert problem["setting"] == "GEODESIC_MAX_UPLOAD_BYTES"
+        assert problem["setting"] == "max_upload_bytes"
 
         chunks = iter([large.encode()[:100], large.encode()[100:]])
         streamed = client.post("/v1/meshes", params={"format": "off"}, content=chunks)
@@ -504,7 +586,7 @@ def test_limits_of_uploads(tmp_path: Path) -> None:
         body = {"sources": [{"vertex": 0}]}
         query = client.post(f"/v1/meshes/{'0' * 32}/distances", json=body)
         problem = check_problem(query, 413, "upload_too_large")
-        assert problem["setting"] == "GEODESIC_MAX_QUERY_BYTES"
+        assert problem["setting"] == "max_query_bytes"
 
 
 # Reading
@@ -602,7 +684,7 @@ def test_a_report_that_has_changed_has_another_tag(client: TestClient) -> None:
 
 def test_list_in_parts(tmp_path: Path) -> None:
     with serving(tmp_path) as client:
-        ids = {upload_sample(client, "plane", faces) for faces in (50, 100, 200, 400, 800)}
+        ids = [upload_sample(client, "plane", faces) for faces in (50, 100, 200, 400, 800)]
         found, cursor, parts = [], None, 0
         while parts == 0 or cursor:
             params = {"limit": 2} | ({"cursor": cursor} if cursor else {})
@@ -611,7 +693,25 @@ def test_list_in_parts(tmp_path: Path) -> None:
             cursor, parts = part["next_cursor"], parts + 1
 
         assert parts == 3
-        assert found == sorted(ids)
+        assert found == ids[::-1], "the newest first"
+
+
+def test_lists_tell_little_of_each_mesh(tmp_path: Path) -> None:
+    body = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 3, 0]], "faces": [[0, 1, 2]]}
+    with serving(tmp_path) as client:
+        plane = upload_sample(client, "plane", 8)
+        report = client.post("/v1/meshes", params={"name": "one"}, json=body).json()
+        members = ("id", "name", "vertices", "faces", "created")
+        listed = client.get("/v1/meshes").json()["meshes"]
+        assert listed[0] == {name: report[name] for name in members}
+        assert [each["id"] for each in listed] == [report["id"], plane]
+
+        named = client.get("/v1/meshes", params={"name": "plane"}).json()["meshes"]
+        assert [each["id"] for each in named] == [plane]
+        assert client.get("/v1/meshes", params={"name": "pla"}).json()["meshes"] == []
+        client.delete(f"/v1/meshes/{report['id']}")
+        client.post("/v1/meshes", params={"name": "two"}, json=body)
+        assert client.get("/v1/meshes").json()["meshes"][0]["name"] == "two"
 
 
 @pytest.mark.parametrize("params", [{"limit": 0}, {"limit": 1001}, {"page": 2}])
@@ -656,6 +756,23 @@ def test_damage_is_reported(tmp_path: Path) -> None:
         problem = check_problem(response, 500, "mesh_damaged")
         assert "vertices" in problem["detail"]
         assert "upload it again" in problem["hint"]
+
+
+def test_a_list_reads_its_manifests_beside_the_event_loop(
+    client: ServiceClient, plane: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A thousand of them are a thousand files."""
+    readers: set[int] = set()
+
+    def noted(path: str) -> Any:
+        readers.add(threading.get_ident())
+        return read_manifest(path)
+
+    monkeypatch.setattr("app.store.meshes.manifest_of", noted)
+    listed = client.get("/v1/meshes", params={"limit": 1000}).json()["meshes"]
+    assert plane in {mesh["id"] for mesh in listed}
+    assert readers
+    assert client.portal.call(threading.get_ident) not in readers
 
 
 def test_meshes_and_results_survive_a_restart(tmp_path: Path) -> None:

@@ -151,8 +151,8 @@ def test_jobs_queue_workers_and_cancellations(watched: ServiceClient) -> None:
         first, second = submit(watched, large, 7), submit(watched, large, 8)
         wait_until(lambda: watched.get(first).json()["status"] == "running")
         during = scrape(watched)
-        watched.delete(second)
-        watched.delete(first)
+        watched.post(f"{second}/cancel")
+        watched.post(f"{first}/cancel")
 
     assert value(during, "jobs", status="running") == value(during, "jobs", status="accepted") == 1
     assert value(during, "queue_length") == 1
@@ -285,7 +285,7 @@ def test_the_wait_for_a_worker(watched: ServiceClient) -> None:
 
 def test_evictions_from_each_store_and_cache(tmp_path: Path) -> None:
     small = {"store_evict": "lru", "store_bytes": 300_000, "results_memory_bytes": 20_000}
-    small |= {"worker_mesh_bytes": 1, "worker_field_bytes": 1, "results_bytes": 1}
+    small |= {"worker_mesh_bytes": 1, "worker_field_bytes": 1, "results_bytes": 100}
     with serving(tmp_path, **small) as client:
         for faces in (200, 300, 400):
             mesh_id = upload_sample(client, "plane", faces)

@@ -38,13 +38,13 @@ def limits_of(client: TestClient, caller: Any) -> Any:
 def test_stored_meshes(tmp_path: Path) -> None:
     quota = 120_000
     with keyed(tmp_path, quota_bytes=quota) as client:
-        assert limits_of(client, ALICE)["GEODESIC_QUOTA_BYTES"] == quota
+        assert limits_of(client, ALICE)["quota_bytes"] == quota
         own = upload(client, ALICE, 200)
         assert own.status_code == 201
         refused = upload(client, ALICE, 242)
         problem = check_problem(refused, 507, "quota_exceeded")
         assert problem["limit"] == quota < problem["actual"]
-        assert problem["setting"] == "GEODESIC_QUOTA_BYTES"
+        assert problem["setting"] == "quota_bytes"
         assert problem["hint"]
         assert "retry-after" not in refused.headers
         assert upload(client, ALICE, 200).status_code == 200, "it is stored already"
@@ -62,7 +62,7 @@ def test_stored_meshes(tmp_path: Path) -> None:
 
 def test_uploads_at_once(tmp_path: Path) -> None:
     with keyed(tmp_path, quota_uploads=1) as client, ThreadPoolExecutor(2) as pool:
-        assert limits_of(client, ALICE)["GEODESIC_QUOTA_UPLOADS"] == 1
+        assert limits_of(client, ALICE)["quota_uploads"] == 1
         with stopped(client.workers()):
             of_alice = pool.submit(upload, client, ALICE, 50)
             wait_until(lambda: client.load.busy + client.load.waiting == 1)
@@ -72,7 +72,7 @@ def test_uploads_at_once(tmp_path: Path) -> None:
             ):
                 problem = check_problem(again, 429, "quota_exceeded")
                 assert (problem["limit"], problem["actual"]) == (1, 2)
-                assert problem["setting"] == "GEODESIC_QUOTA_UPLOADS"
+                assert problem["setting"] == "quota_uploads"
                 assert again.headers["retry-after"] == "1"
             assert client.get("/v1", headers=ALICE).status_code == 200
             of_bob = pool.submit(upload, client, BOB, 98)
@@ -123,7 +123,7 @@ def test_jobs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for module in ("job", "retention"):
         monkeypatch.setattr(f"app.jobs.{module}.datetime", calendar)
     with keyed(tmp_path, quota_jobs=2, job_ttl=86_400) as client, ThreadPoolExecutor(4) as pool:
-        assert limits_of(client, ALICE)["GEODESIC_QUOTA_JOBS"] == 2
+        assert limits_of(client, ALICE)["quota_jobs"] == 2
         asker = Asker(client)
         with stopped(client.workers()):
             first = asker.submit(ALICE, "first")
@@ -134,7 +134,7 @@ def test_jobs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
             second, refused = at_once[:2]
             problem = check_problem(refused, 429, "quota_exceeded")
             assert (problem["limit"], problem["actual"]) == (2, 3)
-            assert problem["setting"] == "GEODESIC_QUOTA_JOBS"
+            assert problem["setting"] == "quota_jobs"
             assert problem["hint"]
             assert refused.headers["retry-after"] == "1"
             again = asker.submit(ALICE, "first")
@@ -158,6 +158,29 @@ def test_jobs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         assert refused.headers["retry-after"] == "86400", "ten years ago nothing had ended"
         assert client.delete(second.headers["location"], headers=ALICE).status_code == 200
         assert asker.submit(ALICE).status_code == 202
+
+
+def test_answers_to_jobs_of_one_caller_leave_room_for_those_of_another(tmp_path: Path) -> None:
+    """Alice fills what she may have; the next job is refused before any work, and Bob's is not."""
+    with keyed(tmp_path, results_bytes=100_000, results_memory_bytes=1) as client:
+        link = f"/v1/meshes/{upload(client, ALICE, 3200).json()['id']}/distances"  # 1 681 vertices
+        assert limits_of(client, ALICE)["quota_results_bytes"] == 50_000
+
+        def submit(caller: Any, vertex: int) -> Any:
+            headers = {**caller, "Prefer": "respond-async", "Accept": "application/x-npy"}
+            return client.post(link, json={"sources": [vertex]}, headers=headers)
+
+        def run(caller: Any, vertex: int) -> None:
+            job = submit(caller, vertex).headers["location"]
+            wait_until(lambda: client.get(job, headers=caller).json()["status"] == "successful")
+
+        for vertex in range(3):
+            run(ALICE, vertex)
+        solved = client.app.state.service.answering.solves["distances"]
+        problem = check_problem(submit(ALICE, 3), 507, "quota_exceeded")
+        assert problem["limit"] == 50_000 < problem["actual"]
+        assert client.app.state.service.answering.solves["distances"] == solved
+        run(BOB, 4)
 
 
 def test_without_keys_all_that_is_stored_has_one_owner(tmp_path: Path) -> None:

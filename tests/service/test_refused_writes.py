@@ -61,7 +61,7 @@ def test_the_database_of_jobs_cannot_be_written_for_a_while(tmp_path: Path) -> N
                 check_problem(submit(server, mesh_id, 2), 507, "storage_full")
                 check_problem(server.client.delete(done), 507, "storage_full")
                 assert server.client.get(f"{done}/results").status_code == 200
-                check_problem(server.client.delete(running), 507, "storage_full")
+                check_problem(server.client.post(f"{running}/cancel"), 507, "storage_full")
                 assert get(running) == "dismissed"
                 assert not read_jobs(database)[1].is_finished
         assert submit(server, mesh_id, 2).status_code == 202

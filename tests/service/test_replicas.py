@@ -83,7 +83,7 @@ def test_a_job_of_one_is_stopped_by_the_other(pair: Pair, slow: str) -> None:
     with stopped(first.both_workers()):
         job = job_of(submit(first, slow, 2.0))
         wait_until(lambda: status_of(first, job) == "running")
-        assert second.client.delete(job).json()["status"] == "dismissed"
+        assert second.client.post(f"{job}/cancel").json()["status"] == "dismissed"
         wait_until(lambda: status_of(first, job) == "dismissed")
         check_problem(first.client.get(f"{job}/results"), 410, "job_dismissed")
     wait_until(lambda: first.metric('geodesic_workers{state="busy"}') == 0)

@@ -109,7 +109,7 @@ def test_a_limit_that_was_lowered_meanwhile(tmp_path: Path) -> None:
     with serving(tmp_path, max_sources=2) as second:
         problem = end_of(second, beyond)["problem"]
         assert (problem["code"], problem["limit"], problem["actual"]) == ("limit_exceeded", 2, 3)
-        assert problem["setting"] == "GEODESIC_MAX_SOURCES"
+        assert problem["setting"] == "max_sources"
         check_problem(second.get(f"{beyond}/results"), 422, "limit_exceeded")
         assert end_of(second, within)["status"] == "successful"
 

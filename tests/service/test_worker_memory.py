@@ -97,7 +97,7 @@ def test_an_upload_that_takes_too_much_is_refused_and_the_worker_lives(
         response = tight.post("/v1/meshes", params={"format": "ply"}, content=data)
         problem = check_problem(response, 422, "memory_limit")
         assert problem["limit"] == LEAST_WORKER_MEMORY
-        assert problem["setting"] == "GEODESIC_WORKER_MEMORY_BYTES"
+        assert problem["setting"] == "worker_memory_bytes"
 
     assert tight.post("/v1/meshes", json=TWO_TRIANGLES).status_code in (200, 201)
     assert tight.workers() == workers
@@ -113,7 +113,7 @@ def test_json_that_takes_too_much_is_refused_and_the_worker_lives(tight: Service
     )
 
     problem = check_problem(response, 422, "memory_limit")
-    assert problem["setting"] == "GEODESIC_WORKER_MEMORY_BYTES"
+    assert problem["setting"] == "worker_memory_bytes"
     assert tight.workers() == workers
 
 
@@ -127,6 +127,6 @@ def test_a_query_that_takes_too_much_is_refused_and_the_next_is_not(tight: Servi
 
     problem = check_problem(response, 422, "memory_limit")
     assert problem["limit"] == LEAST_WORKER_MEMORY
-    assert problem["setting"] == "GEODESIC_WORKER_MEMORY_BYTES"
+    assert problem["setting"] == "worker_memory_bytes"
     assert distances(tight, mesh_id, targets=[{"vertex": 1}]).status_code == 200
     assert tight.workers() == workers

@@ -29,7 +29,6 @@ from app.jobs import Job, read_jobs
 from app.queries import DistancesQuery, MeshSize, code_version, field_cache
 from app.schemas.requests import DistancesRequest
 from app.service.maintenance import inspect, jobs_of, leftovers
-from app.service.question import Question
 from app.service.request_context import RequestContext
 from app.service.service import Service
 from app.settings import Settings
@@ -90,12 +89,12 @@ class Store:
         while not any(job.status == "running" for job in read_jobs(self.root / "jobs.sqlite3")):
             await asyncio.sleep(0)
 
-    def question(self, media_type: str) -> Question:
+    def query(self, media_type: str) -> DistancesQuery:
         query = DistancesQuery.ask(self.mesh_id, SIZE, DistancesRequest(sources=[{"vertex": 3}]))
-        return Question(query, SIZE, Representation(media_type), CONTEXT.caller.name)
+        return query.answered_as(Representation(media_type))
 
     async def submit(self, service: Service, media_type: str, key: str | None = None) -> str:
-        job = await service.query_jobs.submit(self.question(media_type), CONTEXT, key)
+        job = await service.query_jobs.submit(self.query(media_type), CONTEXT, key)
         return job.id
 
 
@@ -115,7 +114,7 @@ async def live(store: Store) -> None:
             await end_of(service, job_id)
             store.tell(job_id, "successful")
         store.tell(job_id, "deleting")
-        await service.jobs.dismiss(None, job_id)
+        await service.jobs.remove(None, job_id)
         store.tell(job_id, "deleted")
 
         has_begun = asyncio.Event()
@@ -129,7 +128,7 @@ async def live(store: Store) -> None:
         store.tell(job_id, "accepted")
         await has_begun.wait()
         store.tell(job_id, "deleting")
-        await service.jobs.dismiss(None, job_id)
+        await service.jobs.cancel(None, job_id)
         store.tell(job_id, "dismissed")
 
 

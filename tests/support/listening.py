@@ -26,6 +26,8 @@ class Listener:
     port: int
     state: uvicorn.server.ServerState
     parsed_bytes: list[int] = field(default_factory=list)
+    drained_bytes: list[int] = field(default_factory=list)
+    """What came after a refusal"""
     parsed_chunks: list[int] = field(default_factory=list)
     turns: list[int] = field(default_factory=list)
     """For each read, how often the event loop had gone round, once it is counted"""
@@ -144,6 +146,7 @@ def listening(settings: Settings) -> Iterator[Listener]:
 
         def data_received(self, data: bytes | memoryview) -> None:
             if self._is_refused:
+                listener.drained_bytes.append(len(data))
                 super().data_received(data)
                 return
             listener.parsed_bytes.append(len(data))

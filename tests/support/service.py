@@ -1,8 +1,8 @@
 """A service in this process: real worker processes, a real store."""
 
 import os
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import AbstractContextManager, asynccontextmanager, contextmanager, nullcontext
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from app.store.folder_meshes import FolderMeshes
 from app.store.mesh_catalog import MeshCatalog
 from app.store.meshes import MeshStore
 from app.store.ownership import owned
+from app.store.scratch import Scratch
 from geodesic_core.fields.fast_sweep import FastSweep
 from geodesic_core.fields.sweeps import WholeSweep
 from tests.support.against import ClusterClient, is_against_cluster, serving_cluster
@@ -119,13 +120,22 @@ def apart(client: TestClient) -> str:
     return str(client.post("/v1/meshes", json=TWO_TRIANGLES).json()["id"])
 
 
+@asynccontextmanager
+async def scratch_folder(store: MeshStore) -> AsyncIterator[Path]:
+    """Lend a scratch folder of a store on which no service runs."""
+    scratch = Scratch(store.folder.parent, 2**60)
+    scratch.prepare(is_alone=False)
+    async with scratch.folder("somebody") as folder:
+        yield folder.path
+
+
 def store_mesh(root: Path, mesh: gc.TriangleMesh, owner: str | None = None) -> str:
     """Put a mesh into a store on which no service runs."""
     store = MeshStore(root)
-    catalog = MeshCatalog(root, FolderMeshes(root), 2**60, evicts=False)
+    catalog = MeshCatalog(FolderMeshes(root), 2**60, evicts=False)
 
     async def add() -> str:
-        async with catalog.scratch_folder() as folder:
+        async with scratch_folder(store) as folder:
             written = store.write_aside(mesh, folder / "mesh", owner)
             await catalog.add(written)
             return written.mesh_id

@@ -37,8 +37,8 @@ def distances_query(
 
 def run_query(query: Query[Any], media_type: str = "application/json") -> RunQuery:
     """Return the work of answering a query."""
-    form = Representation(media_type)
-    return RunQuery(query, form, result_name(query.mesh_id, result_key(query, form)))
+    query = query.answered_as(Representation(media_type))
+    return RunQuery(query, result_name(query.mesh_id, result_key(query)))
 
 
 def outcome_of(worker: Worker, query: Query[Any], media_type: str = "application/json") -> Outcome:

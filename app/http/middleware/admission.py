@@ -10,6 +10,7 @@ from app.errors import ProblemError, problem
 from app.http.middleware.probes import PROBES
 from app.http.middleware.rate_limits import MinuteRate, RateLimits
 from app.http.page import ASSETS
+from app.http.prefix import path_in
 from app.settings import Settings
 from app.state import Allowances
 
@@ -47,11 +48,11 @@ class AdmissionMiddleware:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
-        if scope["type"] != "http" or is_open(scope["path"]):
+        if scope["type"] != "http" or is_open(path_in(scope)):
             await self.app(scope, receive, send)
             return
         scope["state"]["caller"] = caller = await self._admit(scope)
-        if self.allowances is None or scope["path"] == _COUNTED_LOCALLY:
+        if self.allowances is None or path_in(scope) == _COUNTED_LOCALLY:
             with self.rate_limits.counting(caller):
                 await self.app(scope, receive, send)
         else:

@@ -6,7 +6,7 @@ from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.errors import problem
-from app.settings import Settings, variable_of
+from app.settings import Settings
 
 
 class BodyTimeoutMiddleware:
@@ -31,7 +31,7 @@ class BodyTimeoutMiddleware:
                     message = await receive()
             except TimeoutError:
                 detail = f"the body was not complete within {self.limit_s:g} s"
-                setting = variable_of("deadline_s")
+                setting = "deadline_s"
                 raise problem(
                     "deadline_exceeded", detail, limit=self.limit_s, setting=setting
                 ) from None

@@ -9,6 +9,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from app.access import is_loopback
 from app.errors import ProblemError, problem
 from app.http.middleware.probes import PROBES
+from app.http.prefix import path_in
 from app.settings import Settings, variable_of
 
 _SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
@@ -31,7 +32,7 @@ class CrossSiteMiddleware:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
         # Probes reveal nothing, and are asked for under any name.
-        if scope["type"] == "http" and scope["path"] not in PROBES:
+        if scope["type"] == "http" and path_in(scope) not in PROBES:
             self._check_host(scope)
             if scope["method"] not in _SAFE:
                 self._check_origin(scope)
@@ -49,11 +50,16 @@ class CrossSiteMiddleware:
     def _check_origin(self, scope: Scope) -> None:
         headers = Headers(scope=scope)
         # Browsers send it, and pages cannot forge it. It holds where a proxy changes `Host`.
-        if headers.get("sec-fetch-site") in ("same-origin", "none"):
+        site = headers.get("sec-fetch-site")
+        if site in ("same-origin", "none"):
             return
         origin = headers.get("origin")
-        if origin is None or "*" in self.origins or origin in self.origins:
+        if "*" in self.origins or origin in self.origins:
             return
+        if origin is None:
+            if site is not None:
+                raise _origin_not_allowed("another site")
+            return  # no browser
         netloc = _netloc(origin)
         if netloc != headers.get("host", "").lower() and not _is_among(_name(netloc), self.hosts):
             raise _origin_not_allowed(origin)
@@ -81,14 +87,13 @@ def _name(host: str) -> str:
 def _host_not_allowed(name: str) -> ProblemError:
     detail = f"the service does not accept requests for the host name {name[:100]!r}"
     hint = f"an operator can allow it with {variable_of('allowed_hosts')}"
-    return problem("host_not_allowed", detail, hint=hint, setting=variable_of("allowed_hosts"))
+    return problem("host_not_allowed", detail, hint=hint, setting="allowed_hosts")
 
 
 def _origin_not_allowed(origin: str) -> ProblemError:
     detail = f"a page from {origin[:100]!r} may not make changes here"
-    setting = variable_of("cors_origins")
     hint = (
-        f"an operator can allow it with {setting}; a proxy must pass on `Host` unchanged, or its "
-        f"name must be in {variable_of('allowed_hosts')}"
+        f"an operator can allow it with {variable_of('cors_origins')}; a proxy must pass on `Host` "
+        f"unchanged, or its name must be in {variable_of('allowed_hosts')}"
     )
-    return problem("origin_not_allowed", detail, hint=hint, setting=setting)
+    return problem("origin_not_allowed", detail, hint=hint, setting="cors_origins")

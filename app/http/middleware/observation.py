@@ -9,6 +9,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from app.access import Caller, caller_at
 from app.http.metrics import Metrics
 from app.http.middleware.probes import PROBES
+from app.http.prefix import path_in
 from app.settings import Settings
 from app.tracing import trace_fields
 
@@ -55,7 +56,7 @@ class ObservationMiddleware:
         operation = getattr(route, "operation_id", None) or _NONE
         caller = state.get("caller") or _client(scope)
         self.metrics.note(operation, status, seconds, caller)
-        if scope["path"] in PROBES and not self.logs_probes:
+        if path_in(scope) in PROBES and not self.logs_probes:
             return
         work: Mapping[str, float] = state.get("work_seconds", {})
         logger.info(

@@ -11,8 +11,9 @@ from structlog.contextvars import bound_contextvars
 
 from app.errors import PROBLEM_JSON, Problem, draining, problem_of_status
 from app.http.failures import CLIENT_CLOSED, note_failure
+from app.http.prefix import prefix_of
 from app.http.responses import common_headers, problem_response
-from app.settings import Settings, variable_of
+from app.settings import Settings
 from app.tracing import trace_fields
 
 _SANE_ID = re.compile(r"[\w.:-]{1,128}")
@@ -36,7 +37,7 @@ class RequestIdMiddleware:
         has_started = is_replaced = False
 
         async def answer(problem: Problem) -> None:
-            response = problem_response(problem, scope["path"], request_id)
+            response = problem_response(problem, scope["path"], request_id, prefix_of(scope))
             response.headers.update(own_headers)
             await response(scope, receive, send)
 
@@ -85,7 +86,7 @@ def body_too_large(scope: Scope, settings: Settings) -> Problem:
     """Return the problem for a body above the limit that Starlette noted in ``scope``."""
     limit = scope[MAX_BODY_SIZE_SCOPE_KEY]
     is_upload = limit == settings.max_upload_bytes
-    setting = variable_of("max_upload_bytes" if is_upload else "max_query_bytes")
+    setting = "max_upload_bytes" if is_upload else "max_query_bytes"
     declared = Headers(scope=scope).get("content-length", "")
     return Problem(
         "upload_too_large",

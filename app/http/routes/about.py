@@ -11,11 +11,12 @@ from app.errors import CODES, draining, problem
 from app.http import page
 from app.http.dependencies import ServiceDep
 from app.http.metrics import Metrics
+from app.http.prefix import prefix_of
 from app.http.responses import UNSTORED, documented, problems
 from app.schemas.meshes import MESH_FORMATS, SampleName
 from app.schemas.requests import Method
 from app.schemas.service import About, Health, Index, ProblemCode
-from app.settings import Settings, variable_of
+from app.settings import Settings
 
 router = APIRouter(tags=["service"])
 
@@ -24,6 +25,7 @@ _LIMITS = (
     "max_upload_bytes",
     "max_query_bytes",
     "max_faces",
+    "max_vertices",
     "max_sources",
     "max_matrix_cells",
     "max_waypoints",
@@ -39,6 +41,7 @@ _LIMITS = (
     "max_concurrent",
     "quota_bytes",
     "quota_jobs",
+    "quota_results_bytes",
     "quota_uploads",
 )
 
@@ -61,11 +64,12 @@ async def get_index(request: Request, response: Response) -> Response | Index:
     if page.is_built() and page.wants_page(request.headers):
         return page.page_response(request.scope)
     response.headers["Vary"] = "Accept"
+    prefix = prefix_of(request.scope)
     links = {
-        "about": "/v1",
-        "meshes": "/v1/meshes",
-        "openapi": "/openapi.json",
-        "docs": "/docs",
+        "about": f"{prefix}/v1",
+        "meshes": f"{prefix}/v1/meshes",
+        "openapi": f"{prefix}/openapi.json",
+        "docs": f"{prefix}/docs",
     }
     shown = "for browsers" if page.is_built() else "not part of this package"
     return Index(service="geodesic", version=__version__, page=shown, links=links)
@@ -75,7 +79,7 @@ async def get_index(request: Request, response: Response) -> Response | Index:
 async def get_reference(request: Request) -> Response:
     """Return the page that shows the interface document."""
     if not page.is_built():
-        detail = "this package has no reference page; /openapi.json has the same document"
+        detail = "this package has no reference page; openapi.json beside it has the same document"
         raise problem("not_found", detail)
     return page.page_response(request.scope, "docs.html")
 
@@ -105,7 +109,7 @@ async def get_readiness(service: ServiceDep) -> Health:
 
 def about(settings: Settings) -> bytes:
     """Return what `get_about` answers, which does not change while the service runs."""
-    limits = {variable_of(name): getattr(settings, name) for name in _LIMITS}
+    limits = {name: getattr(settings, name) for name in _LIMITS}
     document = About(
         version=__version__,
         methods=list(get_args(Method)),

@@ -10,6 +10,7 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from app.encoding import JSON
 from app.errors import ProblemError, problem
 from app.http.dependencies import CallerDep, ServiceDep, check_accepted
+from app.http.prefix import prefix_of
 from app.http.responses import (
     FILE_HEADERS,
     QUERY_PROBLEMS,
@@ -53,6 +54,7 @@ JobDep = Annotated[Job, Depends(get_job_of_path)]
 )
 async def list_jobs(
     parameters: Annotated[ListParameters, Query()],
+    request: Request,
     response: Response,
     service: ServiceDep,
     caller: CallerDep,
@@ -62,7 +64,10 @@ async def list_jobs(
     before = _number(parameters.cursor)
     jobs, after = await service.jobs.page(caller.owner, parameters.limit, before)
     cursor = None if after is None else str(after)
-    return {"jobs": [job_document(job) for job in jobs], "next_cursor": cursor}
+    return {
+        "jobs": [job_document(job, prefix_of(request.scope)) for job in jobs],
+        "next_cursor": cursor,
+    }
 
 
 @router.get(
@@ -76,26 +81,45 @@ async def list_jobs(
         **problems("job_not_found", "state_unavailable"),
     },
 )
-async def get_job(job: JobDep, response: Response) -> dict[str, Any]:
+async def get_job(job: JobDep, request: Request, response: Response) -> dict[str, Any]:
     """Return the state of a job; the status is 200 in every state."""
     response.headers.update(UNSTORED)
-    return job_document(job)
+    return job_document(job, prefix_of(request.scope))
 
 
-@router.delete(
-    "/{job_id}",
-    operation_id="dismissJob",
-    summary="Stop a job, or remove one that has finished",
+@router.post(
+    "/{job_id}/cancel",
+    operation_id="cancelJob",
+    summary="Stop a job",
     response_model=JobDocument,
     response_model_exclude_unset=True,
     responses=problems("job_not_found", "state_unavailable"),
 )
-async def dismiss_job(job: JobDep, service: ServiceDep, caller: CallerDep) -> dict[str, Any]:
+async def cancel_job(
+    job_id: str, request: Request, service: ServiceDep, caller: CallerDep
+) -> dict[str, Any]:
     """Stop a job that waits or runs; its state becomes `dismissed`.
 
-    A job that has finished or was dismissed is removed, with its answer.
+    A job that has finished stays as it is, with its answer.
     """
-    return job_document(await service.jobs.dismiss(caller.owner, job.id))
+    cancelled = await service.jobs.cancel(caller.owner, job_id)
+    return job_document(cancelled, prefix_of(request.scope))
+
+
+@router.delete(
+    "/{job_id}",
+    operation_id="deleteJob",
+    summary="Remove a job and its answer",
+    response_model=JobDocument,
+    response_model_exclude_unset=True,
+    responses=problems("job_not_found", "state_unavailable"),
+)
+async def delete_job(
+    job_id: str, request: Request, service: ServiceDep, caller: CallerDep
+) -> dict[str, Any]:
+    """Remove a job, and return its last state; one that waits or runs is stopped first."""
+    removed = await service.jobs.remove(caller.owner, job_id)
+    return job_document(removed, prefix_of(request.scope))
 
 
 @router.get(
@@ -157,6 +181,7 @@ async def get_job_results(
 )
 async def watch_job(
     job: JobDep,
+    request: Request,
     service: ServiceDep,
     last_event_id: Annotated[
         str | None,
@@ -169,7 +194,9 @@ async def watch_job(
     saw gets only later states. A comment is sent every 15 s.
     """
     async for state in service.jobs.watch(job, _version(last_event_id)):
-        yield ServerSentEvent(data=job_document(state), id=str(state.version))
+        yield ServerSentEvent(
+            data=job_document(state, prefix_of(request.scope)), id=str(state.version)
+        )
 
 
 def _version(event_id: str | None) -> int:

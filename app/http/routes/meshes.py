@@ -10,7 +10,15 @@ from fastapi import APIRouter, Query, Request, Response
 from app.encoding import NPY
 from app.engine.work import MeshFromFile, MeshFromSample
 from app.errors import Fault, over_limit, problem
-from app.http.dependencies import CallerDep, ContextDep, ServiceDep, note_work, while_connected
+from app.http.dependencies import (
+    CallerDep,
+    ContextDep,
+    ServiceDep,
+    note_work,
+    refuse_idempotency_key,
+    while_connected,
+)
+from app.http.prefix import prefix_of
 from app.http.responses import (
     FILE_HEADERS,
     IMMUTABLE,
@@ -19,13 +27,14 @@ from app.http.responses import (
     StoredFileResponse,
     documented,
     etag_of,
+    listed_mesh,
     mesh_document,
     not_modified,
     problems,
     server_timing,
 )
 from app.http.uploads import spool
-from app.schemas.meshes import ListParameters, MeshDocument, MeshList, UploadParameters
+from app.schemas.meshes import MeshDocument, MeshList, MeshListParameters, UploadParameters
 from app.service.request_context import RequestContext
 from app.service.service import Service, StoredMesh
 from app.service.time_limit import time_limit
@@ -96,6 +105,7 @@ _BODIES = {
         },
         **problems(
             "malformed_body",
+            "idempotency_key_unused",
             "upload_too_large",
             "unsupported_media_type",
             "invalid_mesh",
@@ -120,6 +130,7 @@ async def create_mesh(
     triangles keep the order they have in the file; polygons become triangles in their place, and
     `face_map` leads back to them.
     """
+    refuse_idempotency_key(request)
     async with service.counting_upload(context.caller):
         if parameters.sample is None:
             stored = await _add_upload(service, parameters, request, context)
@@ -131,8 +142,9 @@ async def create_mesh(
     note_work(request, stored.manifest["id"], stored.seconds)
     response.status_code = 201 if stored.is_new else 200
     response.headers.update(server_timing(stored.seconds))
-    response.headers["Location"] = f"/v1/meshes/{stored.manifest['id']}"
-    return mesh_document(stored.manifest)
+    prefix = prefix_of(request.scope)
+    response.headers["Location"] = f"{prefix}/v1/meshes/{stored.manifest['id']}"
+    return mesh_document(stored.manifest, prefix)
 
 
 @router.get(
@@ -143,11 +155,13 @@ async def create_mesh(
     responses=problems("invalid_request", "store_unavailable"),
 )
 async def list_meshes(
-    parameters: Annotated[ListParameters, Query()], service: ServiceDep
+    parameters: Annotated[MeshListParameters, Query()], service: ServiceDep
 ) -> dict[str, object]:
-    """List the reports of the meshes by id, `limit` at a time."""
-    manifests, cursor = await service.list_meshes(parameters.limit, parameters.cursor or "")
-    return {"meshes": [mesh_document(each) for each in manifests], "next_cursor": cursor}
+    """List meshes, the newest first, `limit` at a time."""
+    manifests, cursor = await service.mesh_index.page(
+        parameters.limit, parameters.cursor or "", parameters.name
+    )
+    return {"meshes": [listed_mesh(each) for each in manifests], "next_cursor": cursor}
 
 
 @router.get(
@@ -165,7 +179,7 @@ async def get_mesh(
     mesh_id: str, request: Request, response: Response, service: ServiceDep
 ) -> Response | dict[str, object]:
     """Return the report of a mesh, the same as after its upload."""
-    document = mesh_document(await service.manifest(mesh_id))
+    document = mesh_document(await service.manifest(mesh_id), prefix_of(request.scope))
     # A mesh that is deleted and uploaded again has the same id, but perhaps another name.
     etag = etag_of(hashlib.blake2b(orjson.dumps(document), digest_size=16).hexdigest())
     headers = {**REVALIDATED, "ETag": etag}
@@ -231,8 +245,9 @@ async def _add_upload(
     if parameters.faces is not None:
         fault = Fault("/query/faces", "the number of faces can be chosen for a sample only")
         raise problem("invalid_request", fault.message, errors=(fault,))
+    service.engine.refuse_when_full(context.caller.name)  # before the body is read
     async with (
-        service.mesh_catalog.scratch_folder() as folder,
+        service.scratch.folder(context.caller.name) as folder,
         time_limit(service.settings, context.deadline_s),
     ):
         limit = service.settings.max_upload_bytes

@@ -4,12 +4,11 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
-from pydantic import Field
 
-from app.encoding import CSV, GEOJSON, JSON, NPY, NPZ, OBJ, OCTETS, PLY, SVG
+from app.encoding import CSV, JSON, NPY, NPZ, OBJ, OCTETS, PLY
 from app.encoding.representation import ARRAYS, TEXTS
 from app.http.responses import FILE_HEADERS, QUERY_PROBLEMS, documented, problems
-from app.http.routes.query_request import QueryRequestDep
+from app.http.routes.query_request import AnswerDep
 from app.http.routes.query_route import QueryRoute
 from app.queries import (
     BordersQuery,
@@ -20,19 +19,20 @@ from app.queries import (
     NearestQuery,
     PathQuery,
     PathsQuery,
+    StepsQuery,
     naming_parameters,
     written_request,
 )
 from app.schemas.answers import (
     BordersAnswer,
     DistancesAnswer,
-    Estimate,
     IsolinesAnswer,
     LocateAnswer,
     MatrixAnswer,
     NearestAnswer,
     PathAnswer,
     PathsAnswer,
+    StepsAnswer,
 )
 from app.schemas.requests import (
     AnswerParameters,
@@ -42,16 +42,22 @@ from app.schemas.requests import (
     LocateRequest,
     MatrixRequest,
     NearestRequest,
-    PathAnswerParameters,
     PathParameters,
     PathRequest,
     PathsRequest,
+    StepsRequest,
 )
 from app.schemas.service import JobDocument
 
 router = APIRouter(prefix="/meshes/{mesh_id}", tags=["queries"], route_class=QueryRoute)
 
-_CODES = ("not_acceptable", *QUERY_PROBLEMS, "quota_exceeded", "range_not_satisfiable")
+_CODES = (
+    "idempotency_key_unused",
+    "not_acceptable",
+    *QUERY_PROBLEMS,
+    "quota_exceeded",
+    "range_not_satisfiable",
+)
 _BODY_CODES = ("malformed_body", "upload_too_large", "unsupported_media_type", *_CODES)
 
 
@@ -61,14 +67,14 @@ def _answers(model: type, description: str, *others: str) -> dict[int | str, dic
         ". In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` "
         "names what is too long for one"
     )
-    content = {name: {"schema": _schema(name)} for name in others}
+    content = {name: {"schema": _TEXT if name in TEXTS else _BINARY} for name in others}
     described = documented("Vary", "Server-Timing", *FILE_HEADERS)
     accepted = documented("Location", "Preference-Applied", "Cache-Control")
     if any(name in ARRAYS for name in others):
         described |= documented("Geodesic-Dtype", "Geodesic-Shape")
     return {
         200: {
-            "model": Annotated[model | Estimate, Field(discriminator="kind")],
+            "model": model,
             "content": content,
             "description": description,
             "headers": described,
@@ -88,14 +94,8 @@ def _answers(model: type, description: str, *others: str) -> dict[int | str, dic
 
 _TEXT = {"type": "string"}
 _BINARY = {"type": "string", "format": "binary"}
-_LINES = OBJ, CSV, SVG, GEOJSON
+_LINES = OBJ, CSV
 _PATH = "The path; its points in binary"
-
-
-def _schema(media_type: str) -> dict[str, str]:
-    if media_type == GEOJSON:
-        return {"$ref": "#/components/schemas/FeatureCollection"}
-    return _TEXT if media_type in TEXTS else _BINARY
 
 
 def _posted(name: str, summary: str, answers: Mapping[int | str, Any]) -> dict[str, Any]:
@@ -104,7 +104,7 @@ def _posted(name: str, summary: str, answers: Mapping[int | str, Any]) -> dict[s
         "operation_id": name,
         "summary": summary,
         "response_class": Response,
-        "responses": {**answers, **problems(*_BODY_CODES)},
+        "responses": {**answers, **problems(*_BODY_CODES, quota_exceeded=507)},
     }
 
 
@@ -128,10 +128,10 @@ Parameters = Annotated[AnswerParameters, Query()]
     ),
 )
 async def compute_distances(
-    body: DistancesRequest, parameters: Parameters, query_request: QueryRequestDep
+    body: DistancesRequest, parameters: Parameters, answer: AnswerDep
 ) -> Response:
     """Return the distance along the surface from the nearest source to each vertex."""
-    return await query_request.answer(DistancesQuery, body, parameters)
+    return await answer(DistancesQuery, body, parameters)
 
 
 @router.post(
@@ -142,22 +142,15 @@ async def compute_distances(
         _answers(PathAnswer, _PATH, NPY, OCTETS, *_LINES),
     ),
 )
-async def compute_path(
-    body: PathRequest,
-    parameters: Annotated[PathAnswerParameters, Query()],
-    query_request: QueryRequestDep,
-) -> Response:
+async def compute_path(body: PathRequest, parameters: Parameters, answer: AnswerDep) -> Response:
     """Return the points of the path, from source to target, and the faces it crosses."""
-    explain = body.explain or parameters.explain
-    return await query_request.answer(
-        PathQuery, body.model_copy(update={"explain": explain}), parameters
-    )
+    return await answer(PathQuery, body, parameters)
 
 
 @router.get(
     "/path",
     operation_id="getPath",
-    summary="The shortest path between two points, cacheable",
+    summary="The shortest path between two points, as a link",
     response_class=Response,
     responses={
         **_answers(PathAnswer, _PATH, NPY, OCTETS, *_LINES),
@@ -165,15 +158,29 @@ async def compute_path(
             "description": "The answer has not changed",
             "headers": documented("ETag", "Cache-Control", "Vary"),
         },
-        **problems(*_CODES),
+        **problems(*_CODES, quota_exceeded=507),
     },
 )
-async def get_path(
-    parameters: Annotated[PathParameters, Query()], query_request: QueryRequestDep
-) -> Response:
+async def get_path(parameters: Annotated[PathParameters, Query()], answer: AnswerDep) -> Response:
     """Return the same as `POST`, for points written as `12`, `v12` or `f7:0.2,0.3,0.5`."""
     with naming_parameters():
-        return await query_request.answer(PathQuery, written_request(parameters), parameters)
+        body = written_request(parameters)
+        return await answer(PathQuery, body, AnswerParameters(format=parameters.format))
+
+
+@router.post(
+    "/path/steps",
+    **_posted(
+        "computePathSteps",
+        "The steps of the search for a path",
+        _answers(StepsAnswer, "The steps, in order"),
+    ),
+)
+async def compute_path_steps(
+    body: StepsRequest, parameters: Parameters, answer: AnswerDep
+) -> Response:
+    """Return what the search does to find the exact path: the faces that each step visits."""
+    return await answer(StepsQuery, body, parameters)
 
 
 @router.post(
@@ -184,11 +191,9 @@ async def get_path(
         _answers(PathsAnswer, "The paths, in the order of the targets", *_LINES),
     ),
 )
-async def compute_paths(
-    body: PathsRequest, parameters: Parameters, query_request: QueryRequestDep
-) -> Response:
+async def compute_paths(body: PathsRequest, parameters: Parameters, answer: AnswerDep) -> Response:
     """Return a path to each target, or the reason why there is none."""
-    return await query_request.answer(PathsQuery, body, parameters)
+    return await answer(PathsQuery, body, parameters)
 
 
 @router.post(
@@ -200,10 +205,10 @@ async def compute_paths(
     ),
 )
 async def compute_isolines(
-    body: IsolinesRequest, parameters: Parameters, query_request: QueryRequestDep
+    body: IsolinesRequest, parameters: Parameters, answer: AnswerDep
 ) -> Response:
     """Return the polylines of points at each level, exact where they cross edges."""
-    return await query_request.answer(IsolinesQuery, body, parameters)
+    return await answer(IsolinesQuery, body, parameters)
 
 
 @router.post(
@@ -215,13 +220,13 @@ async def compute_isolines(
     ),
 )
 async def compute_borders(
-    body: BordersRequest, parameters: Parameters, query_request: QueryRequestDep
+    body: BordersRequest, parameters: Parameters, answer: AnswerDep
 ) -> Response:
     """Return polylines of points that are equally near to two sources, and no nearer to a third.
 
     They are exact where they cross edges and where they meet.
     """
-    return await query_request.answer(BordersQuery, body, parameters)
+    return await answer(BordersQuery, body, parameters)
 
 
 @router.post(
@@ -241,14 +246,14 @@ async def compute_borders(
     ),
 )
 async def compute_matrix(
-    body: MatrixRequest, parameters: Parameters, query_request: QueryRequestDep
+    body: MatrixRequest, parameters: Parameters, answer: AnswerDep
 ) -> Response:
     """Return a distance for each source and target, or for each pair.
 
     In binary, a dense matrix and pairs come as npy and octets, a sparse matrix as npz. As a job, a
     dense matrix in npy may be as large as the store has room for; its rows are read in ranges.
     """
-    return await query_request.answer(MatrixQuery, body, parameters)
+    return await answer(MatrixQuery, body, parameters)
 
 
 @router.post(
@@ -256,14 +261,12 @@ async def compute_matrix(
     **_posted(
         "findNearest",
         "The candidates that are nearest to a point along the surface",
-        _answers(NearestAnswer, "The candidates, nearest first", CSV, GEOJSON),
+        _answers(NearestAnswer, "The candidates, nearest first", CSV),
     ),
 )
-async def find_nearest(
-    body: NearestRequest, parameters: Parameters, query_request: QueryRequestDep
-) -> Response:
+async def find_nearest(body: NearestRequest, parameters: Parameters, answer: AnswerDep) -> Response:
     """Return the `k` nearest candidates, or fewer if fewer can be reached."""
-    return await query_request.answer(NearestQuery, body, parameters)
+    return await answer(NearestQuery, body, parameters)
 
 
 @router.post(
@@ -271,14 +274,12 @@ async def find_nearest(
     **_posted(
         "locatePoints",
         "The points of the surface that are nearest to positions",
-        _answers(LocateAnswer, "The points, in the order of the positions", CSV, GEOJSON),
+        _answers(LocateAnswer, "The points, in the order of the positions", CSV),
     ),
 )
-async def locate_points(
-    body: LocateRequest, parameters: Parameters, query_request: QueryRequestDep
-) -> Response:
+async def locate_points(body: LocateRequest, parameters: Parameters, answer: AnswerDep) -> Response:
     """Return the nearest point for each position, `null` where it is farther than `max_distance`.
 
     A point counts as on a vertex or an edge if it is within 1e-12 of the bounding box from it.
     """
-    return await query_request.answer(LocateQuery, body, parameters)
+    return await answer(LocateQuery, body, parameters)

@@ -1,16 +1,9 @@
-"""Query requests: the body and what comes with it, read from HTTP, and the way to a response.
+"""Requests for queries: the body and what comes with it, read from HTTP, and the response."""
 
-Large bodies are read and checked in a thread, so that the event loop goes on. On the event loop
-40 000 points would take a tenth of a second.
-"""
-
-from collections.abc import Callable, Coroutine
-from dataclasses import dataclass
+from collections.abc import Awaitable, Callable, Coroutine
 from functools import partial
-from time import sleep, thread_time
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
-from anyio import to_thread
 from fastapi import Depends, Header, Request, Response
 from pydantic import Field
 from pydantic_core import from_json
@@ -22,15 +15,17 @@ from app.http.dependencies import (
     job_after,
     negotiated,
     note_work,
+    refuse_idempotency_key,
     service_of,
     while_connected,
 )
+from app.http.large_bodies import LARGE, large_bodies_of
+from app.http.prefix import prefix_of
 from app.http.responses import (
     CACHED,
     NEGOTIATED,
     UNSTORED,
     accepted_response,
-    estimate_response,
     etag_of,
     not_modified,
     result_response,
@@ -39,39 +34,7 @@ from app.jobs import Job
 from app.queries import Query, result_key
 from app.schemas.requests import AnswerParameters
 from app.service.answering import Answered
-from app.service.question import Question
-from app.service.request_context import RequestContext
-from app.service.time_limit import time_limit
 from app.settings import Settings
-
-LARGE = 2**16
-"""Bytes of a body that is worth a thread: it takes some milliseconds."""
-
-T = TypeVar("T")
-
-
-async def offload_if_large(request: Request, deadline_s: float, do: Callable[[], T]) -> T:
-    """Run work whose time grows with the body: in a thread, where the body is large.
-
-    Only one thread runs at a time. Several would take the interpreter from each other, and from the
-    event loop. A request waits for it no longer than its client, and no longer than ``deadline_s``.
-    """
-    if len(await request.body()) < LARGE:
-        return do()
-    limiter = request.app.state.large_bodies
-    working = to_thread.run_sync(partial(_at_half_pace, do), limiter=limiter)
-    async with time_limit(service_of(request).settings, deadline_s):
-        return await while_connected(request, working)
-
-
-def _at_half_pace(do: Callable[[], T]) -> T:
-    """Do what holds the interpreter, and rest as long, so that others get at least half of it."""
-    began = thread_time()
-    try:
-        return do()
-    finally:
-        sleep(thread_time() - began)
-
 
 _LEAST_BYTES_OF_VALUE = 7
 """Bytes a value for a body that is full: indices of six digits. To parse denser ones takes long."""
@@ -93,65 +56,6 @@ def parse_json(body: bytes, settings: Settings) -> Any:
         raise problem(code, f"the body cannot be read as JSON: {error}") from None
 
 
-@dataclass(frozen=True)
-class QueryRequest:
-    """A request for a query: the mesh, the caller and the preferences, all but the query itself."""
-
-    mesh_id: str
-    request: Request
-    context: RequestContext
-    job_after_s: int | None
-    """Seconds of waiting from which the client prefers a job; None: never"""
-    idempotency_key: str | None
-
-    async def answer(
-        self, kind: type[Query[Any]], body: Any, parameters: AnswerParameters
-    ) -> Response:
-        """Validate the query in ``body``, and respond with its answer, an estimate or a job."""
-        request, context = self.request, self.context
-        service = service_of(request)
-        size = await service.size(self.mesh_id)
-
-        def make_query() -> Query[Any]:
-            query = kind.ask(self.mesh_id, size, body, service.settings)
-            query.written  # noqa: B018 - computes and caches it
-            return query
-
-        query = await offload_if_large(request, context.deadline_s, make_query)
-        representation = negotiated(request, parameters, query.offers)
-        media_type = representation.media_type
-        question = Question(query, size, representation, context.caller.name)
-        if parameters.estimate:
-            estimating = service.answering.estimate(question, context.deadline_s)
-            estimate, seconds = await while_connected(request, estimating)
-            note_work(request, self.mesh_id, seconds)
-            return estimate_response(self.mesh_id, estimate, media_type, seconds)
-        wait_s, key = self.job_after_s, self.idempotency_key
-        if wait_s == 0:
-            return accepted_response(await service.query_jobs.submit(question, context, key))
-        is_cacheable = request.method == "GET" and query.is_repeatable
-        headers = {**NEGOTIATED, **(CACHED if is_cacheable else UNSTORED)}
-        if is_cacheable:
-            etag = etag_of(result_key(query, representation))
-            unchanged = not_modified(request, etag, headers)
-            if unchanged is not None:
-                return unchanged
-        as_file = "range" in request.headers
-        answering: Coroutine[Any, Any, Answered | Job]
-        if wait_s is None:
-            answering = service.answering.answer(question, context.deadline_s, as_file=as_file)
-        else:
-            answering = service.query_jobs.answer_or_submit(
-                question, context, wait_s, key, as_file=as_file
-            )
-        answer = await while_connected(request, answering)
-        if isinstance(answer, Job):
-            return accepted_response(answer)
-        result, seconds = answer
-        note_work(request, self.mesh_id, seconds)
-        return result_response(request, result, seconds, media_type, service.results, headers)
-
-
 class QueryHeaders(TimeoutHeader):
     """The headers of a request for a query."""
 
@@ -168,16 +72,67 @@ class QueryHeaders(TimeoutHeader):
         min_length=1,
         max_length=255,
         description="Freely chosen key of a job: a request that is sent again with the same key "
-        "gets the same job",
+        "gets the same job. With `Prefer: respond-async` only",
     )
 
 
-async def get_query_request(
+AnswerQuery = Callable[[type[Query[Any]], Any, AnswerParameters], Awaitable[Response]]
+"""Answers the query of a kind in a body, with these parameters"""
+
+
+async def get_answer(
     mesh_id: str, request: Request, headers: Annotated[QueryHeaders, Header()]
-) -> QueryRequest:
-    """Return the request for a query, as a dependency."""
-    context, job_after_s = context_of(request, headers), job_after(headers.prefer)
-    return QueryRequest(mesh_id, request, context, job_after_s, headers.idempotency_key)
+) -> AnswerQuery:
+    """Return what answers the query of a request, as a dependency."""
+    return partial(_answer, mesh_id, request, headers)
 
 
-QueryRequestDep = Annotated[QueryRequest, Depends(get_query_request)]
+AnswerDep = Annotated[AnswerQuery, Depends(get_answer)]
+
+
+async def _answer(
+    mesh_id: str,
+    request: Request,
+    preferences: QueryHeaders,
+    kind: type[Query[Any]],
+    body: Any,
+    parameters: AnswerParameters,
+) -> Response:
+    """Validate the query in ``body``, and respond with its answer or a job."""
+    service, context = service_of(request), context_of(request, preferences)
+    wait_s, key = job_after(preferences.prefer), preferences.idempotency_key
+    if wait_s is None:
+        refuse_idempotency_key(request)
+    size = await service.size(mesh_id)
+
+    def make_query() -> Query[Any]:
+        query = kind.ask(mesh_id, size, body, service.settings)
+        query = query.answered_as(negotiated(request, parameters, query.offers))
+        query.written  # noqa: B018 - computes and caches it
+        return query
+
+    query = await large_bodies_of(request).check(request, context.deadline_s, make_query)
+    if wait_s == 0:
+        job = await service.query_jobs.submit(query, context, key)
+        return accepted_response(job, prefix_of(request.scope))
+    is_cacheable = request.method == "GET"
+    headers = {**NEGOTIATED, **(CACHED if is_cacheable else UNSTORED)}
+    if is_cacheable:
+        unchanged = not_modified(request, etag_of(result_key(query)), headers)
+        if unchanged is not None:
+            return unchanged
+    as_file = "range" in request.headers
+    answering: Coroutine[Any, Any, Answered | Job]
+    if wait_s is None:
+        answering = service.answering.answer(query, context, as_file=as_file)
+    else:
+        answering = service.query_jobs.answer_or_submit(
+            query, context, wait_s, key, as_file=as_file
+        )
+    answer = await while_connected(request, answering)
+    if isinstance(answer, Job):
+        return accepted_response(answer, prefix_of(request.scope))
+    result, seconds = answer
+    note_work(request, mesh_id, seconds)
+    media_type = query.representation.media_type
+    return result_response(request, result, seconds, media_type, service.results, headers)

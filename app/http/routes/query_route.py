@@ -14,10 +14,10 @@ from fastapi.routing import APIRoute
 from pydantic import BaseModel, ValidationError, create_model
 
 from app.http.dependencies import require_json, service_of
+from app.http.large_bodies import large_bodies_of
 from app.http.routes.query_request import (
     QueryHeaders,
-    get_query_request,
-    offload_if_large,
+    get_answer,
     parse_json,
 )
 from app.queries import check_lengths
@@ -25,7 +25,7 @@ from app.settings import Settings
 
 
 class QueryRoute(APIRoute):
-    """A route whose handler takes ``query_request``, ``parameters`` and, unless ``GET``, ``body``.
+    """A route whose handler takes ``answer``, ``parameters`` and, unless ``GET``, ``body``.
 
     The latter two are models.
     """
@@ -44,13 +44,17 @@ class QueryRoute(APIRoute):
             if takes_body:
                 require_json(request)
             head = {"header": _headers(request), "query": _parameters(request, lists)}
-            body = await request.body() if takes_body else b""
             settings = service_of(request).settings
-            reading = partial(read, model, head, body, settings)
-            whole = await offload_if_large(request, settings.deadline_s, reading)
+            if takes_body:
+                large, deadline_s = large_bodies_of(request), settings.deadline_s
+                async with large.reading(request, deadline_s):
+                    reading = partial(read, model, head, await request.body(), settings)
+                    whole = await large.check(request, deadline_s, reading)
+            else:
+                whole = read(model, head, b"", settings)
             mesh_id = request.path_params["mesh_id"]
             response: Response = await self.endpoint(
-                query_request=await get_query_request(mesh_id, request, whole.header),
+                answer=await get_answer(mesh_id, request, whole.header),
                 parameters=whole.query,
                 **({"body": whole.body} if takes_body else {}),
             )

@@ -167,7 +167,7 @@ describe("a job", () => {
     await vi.advanceTimersByTimeAsync(10_000);
 
     await expect(answer).rejects.toMatchObject({ name: "AbortError" });
-    await vi.waitFor(() => expect(removals(requests)).toEqual([LINKS.self, LINKS.self]));
+    await vi.waitFor(() => expect(removals(requests)).toEqual([LINKS.self]));
     expect(requests.some(({ path }) => path === LINKS.results)).toBe(false);
   });
 
@@ -178,7 +178,7 @@ describe("a job", () => {
     stop.abort();
 
     await expect(answer).rejects.toMatchObject({ name: "AbortError" });
-    await vi.waitFor(() => expect(removals(requests)).toEqual([LINKS.self, LINKS.self]));
+    await vi.waitFor(() => expect(removals(requests)).toEqual([LINKS.self]));
   });
 
   test("is left alone when its caller aborts after the answer", async () => {

@@ -4,6 +4,7 @@ import {
   askDistances,
   askIsolines,
   askRoute,
+  askSteps,
   askTerritories,
   locate,
   pointOf,
@@ -125,7 +126,6 @@ describe("paths", () => {
     target: { vertex: 9 },
     waypoints: [],
     barriers: [7],
-    explain: false,
   };
 
   test("of one source are asked for directly", async () => {
@@ -151,6 +151,15 @@ describe("paths", () => {
       { sources, targets: [first], barriers: [7], include: ["nearest_source"] },
       { source: { vertex: 5 }, ...rest },
     ]);
+  });
+
+  test("have the steps of their search at an address of their own", async () => {
+    const steps = [{ leg: 0, name: "exact", bound: 1, windows: 2, faces: [3] }];
+    const requests = fakeService({ "POST /v1/meshes/m/path/steps": () => json({ steps }) });
+    const { sources, ...rest } = route;
+    expect(await askSteps("m", { sources: sources.slice(0, 1), ...rest }, signal)).toEqual(steps);
+
+    expect(requests.map(({ body }) => body)).toEqual([{ source: { vertex: 4 }, ...rest }]);
   });
 
   test("without a way to any source start at the first one", async () => {

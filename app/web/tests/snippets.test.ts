@@ -2,7 +2,7 @@ import { expect, test } from "vitest";
 import { curlOf, pythonOf } from "../src/panel/snippets";
 import { INITIAL, type State } from "../src/state/state";
 
-const HOST = "https://host:8000";
+const HOST = "https://host:8000/geodesic/";
 const SOURCE = { vertex: 1 };
 const STATE: State = { ...INITIAL, mesh: "m", sources: [SOURCE, { vertex: 2 }] };
 
@@ -22,8 +22,8 @@ test("without a target the distances from all sources are asked for", () => {
   const curl = curlOf(state, SOURCE, HOST, false);
   const python = pythonOf(state, SOURCE, HOST, false);
 
-  expect(curl).toContain(`curl '${HOST}/v1/meshes/m/distances'`);
-  expect(python).toContain(`Request("${HOST}/v1/meshes/m/distances"`);
+  expect(curl).toContain(`curl '${HOST}v1/meshes/m/distances'`);
+  expect(python).toContain(`Request("${HOST}v1/meshes/m/distances"`);
   expect(python).toContain('print(answer["distances"])');
   expect([bodyOf(curl), bodyOf(python)]).toEqual([body, body]);
 });
@@ -39,7 +39,7 @@ test("with a target the path from the source in question is asked for", () => {
   const curl = curlOf(state, SOURCE, HOST, false);
   const python = pythonOf(state, SOURCE, HOST, false);
 
-  expect(curl).toContain(`curl '${HOST}/v1/meshes/m/path'`);
+  expect(curl).toContain(`curl '${HOST}v1/meshes/m/path'`);
   expect(python).toContain('print(answer["length"], answer["points"])');
   expect([bodyOf(curl), bodyOf(python)]).toEqual([body, body]);
 });

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from app.encoding import NPY, Encoded
+from app.encoding import NPY
 from app.engine.work import TaskResult
 from app.engine.worker import Worker
 from app.errors import Problem
@@ -171,12 +171,12 @@ def damage_during(patch: pytest.MonkeyPatch, when: str, path: Path, fault: Fault
             fault(path)
         return found
 
-    def encode(*_: Any) -> Encoded:
+    def encode(*_: Any) -> Any:
         def parts() -> Iterator[bytes]:
             yield b"x" * 2**17
             fault(path)
 
-        return Encoded(parts(), {})
+        return parts(), {}
 
     patch.setattr(DistancesQuery, "answer", damaged_answer)
     if when == "encoding":

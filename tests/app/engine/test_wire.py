@@ -17,7 +17,6 @@ from app.engine import wire
 from app.engine.wire import DamagedMessageError, Message, VersionError, Wire, WireError
 from app.engine.work import (
     ComputePart,
-    EstimateQuery,
     JoinParts,
     MeshFromFile,
     MeshFromSample,
@@ -29,7 +28,7 @@ from app.engine.work import (
     Work,
 )
 from app.errors import Fault, Problem
-from app.queries import KINDS, Estimate, MatrixQuery, Query
+from app.queries import KINDS, MatrixQuery, Query
 from app.store.meshes import WrittenMesh
 from app.store.results import Result, ResultManifest
 from app.tracing import Period
@@ -40,6 +39,7 @@ VERTEX = {"vertex": 3}
 REQUESTS: dict[str, dict[str, Any]] = {
     "distances": {"sources": [VERTEX | {"start_distance": 0.1}], "barriers": [1, 2]},
     "path": {"source": VERTEX, "target": {"face": 7, "barycentric": [0.2, 0.3, 0.5]}},
+    "steps": {"source": VERTEX, "target": VERTEX, "waypoints": [VERTEX]},
     "paths": {"source": VERTEX, "targets": [{"edge": [0, 1], "t": 1 / 3}]},
     "isolines": {"sources": [{"polyline": [VERTEX, {"vertex": 4}]}], "levels": [1e-300, 0.1]},
     "borders": {"sources": [VERTEX, {"vertex": 4}], "chord_error": 0.01},
@@ -47,8 +47,11 @@ REQUESTS: dict[str, dict[str, Any]] = {
     "nearest": {"source": VERTEX, "candidates": [VERTEX, {"vertex": 9}], "k": 1},
     "locate": {"points": [[0.1, 0.2, 0.3]], "max_distance": 5e-324},
 }
-QUERIES = [kind(MESH_ID, kind.model.model_validate(REQUESTS[name])) for name, kind in KINDS.items()]
 FORM = Representation("application/json", "float32", "zstd")
+QUERIES = [
+    kind(MESH_ID, kind.model.model_validate(REQUESTS[name]), representation=FORM)
+    for name, kind in KINDS.items()
+]
 
 
 def sent(task: Task) -> Task:
@@ -64,25 +67,25 @@ def returned(outcome: Outcome) -> Outcome:
 
 @pytest.mark.parametrize("query", QUERIES, ids=lambda query: query.kind)
 def test_queries_of_each_kind_arrive(query: Query[Any]) -> None:
-    for work in (RunQuery(query, FORM, f"{MESH_ID}/key"), EstimateQuery(query, FORM)):
-        task = Task(work, "alice", query.affinity_keys, is_small=True, is_promised=True)
+    work = RunQuery(query, f"{MESH_ID}/key")
+    task = Task(work, "alice", query.affinity_keys, is_small=True, is_promised=True)
 
-        assert sent(task) == task
+    assert sent(task) == task
 
 
 def test_parts_of_matrices_arrive() -> None:
     query = next(each for each in QUERIES if isinstance(each, MatrixQuery))
     parts = (f"{MESH_ID}/key-0", f"{MESH_ID}/key-1")
     for work in (
-        ComputePart(query, "float32", 1, parts[1]),
-        JoinParts(query, "float32", parts, 77, f"{MESH_ID}/key"),
+        ComputePart(query, 1, parts[1]),
+        JoinParts(query, parts, 77, f"{MESH_ID}/key"),
     ):
         assert sent(Task(work, "alice", query.affinity_keys, is_promised=True)).work == work
 
 
 def test_other_queries_have_no_parts() -> None:
     query: Any = QUERIES[0]
-    message = Wire(HERE).encode_task(Message(Task(ComputePart(query, "float64", 0, "a/b"), ""), {}))
+    message = Wire(HERE).encode_task(Message(Task(ComputePart(query, 0, "a/b"), ""), {}))
     with pytest.raises(DamagedMessageError, match="has no parts"):
         Wire(HERE).decode_task(message)
 
@@ -116,7 +119,6 @@ def test_uploads_arrive_under_the_paths_of_the_other_machine(where: type) -> Non
                 is_reusable=False,
             ),
         ),
-        TaskResult({}, estimate=Estimate(0.1, 2**40, 17)),
         TaskResult({}, mesh=WrittenMesh({"id": MESH_ID, "report": {"ids": [1, [2, 3]]}}, None)),
         Problem(
             "invalid_mesh",
@@ -152,7 +154,7 @@ def test_whole_limits_stay_whole() -> None:
     assert (type(problem.limit), type(problem.actual)) == (int, int)
 
 
-MESSAGE = Wire(HERE).encode_task(Message(Task(RunQuery(QUERIES[0], FORM, "a/b"), "alice"), {}))
+MESSAGE = Wire(HERE).encode_task(Message(Task(RunQuery(QUERIES[0], "a/b"), "alice"), {}))
 
 
 def test_another_version_is_said_to_be_one() -> None:
@@ -199,7 +201,7 @@ def test_an_outcome_is_no_task() -> None:
         Wire(HERE).decode_outcome(MESSAGE)
 
 
-MATRIX = wire._Query("matrix", MESH_ID, orjson.dumps(REQUESTS["matrix"]))
+MATRIX = wire._Query("matrix", MESH_ID, orjson.dumps(REQUESTS["matrix"]), FORM)
 NAME = f"{MESH_ID}/key"
 
 
@@ -209,11 +211,11 @@ NAME = f"{MESH_ID}/key"
     [
         lambda path: wire._Store(wire._Sample("knot", 10, "none"), path, None, None),
         lambda path: wire._Store(wire._File(path, "obj", "none"), "tmp/x", None, None),
-        lambda path: wire._Run(MATRIX, FORM, path),
-        lambda path: wire._Run(msgspec.structs.replace(MATRIX, mesh_id=path), FORM, NAME),
-        lambda path: wire._Part(MATRIX, "float64", 0, path),
-        lambda path: wire._Join(MATRIX, "float64", [NAME], 1, path),
-        lambda path: wire._Join(MATRIX, "float64", [NAME, path], 1, NAME),
+        lambda path: wire._Run(MATRIX, path),
+        lambda path: wire._Run(msgspec.structs.replace(MATRIX, mesh_id=path), NAME),
+        lambda path: wire._Part(MATRIX, 0, path),
+        lambda path: wire._Join(MATRIX, [NAME], 1, path),
+        lambda path: wire._Join(MATRIX, [NAME, path], 1, NAME),
     ],
     ids=["folder", "file", "result", "mesh", "part", "matrix", "a part of a matrix"],
 )
@@ -235,13 +237,13 @@ def test_the_name_of_a_result_that_returns_stays_in_the_store() -> None:
 
 
 def test_unknown_kinds_and_codes_are_refused() -> None:
-    query = wire._Query("areas", MESH_ID, b"{}")
-    task = wire._Task(wire._Estimate(query, FORM), "alice", (), False, False, {})
+    query = wire._Query("areas", MESH_ID, b"{}", FORM)
+    task = wire._Task(wire._Run(query, "id/key"), "alice", (), False, False, {})
     with pytest.raises(DamagedMessageError, match="no kind of query 'areas'"):
         Wire(HERE).decode_task(wire.encode(task))
 
-    query = wire._Query("distances", MESH_ID, b'{"sources": []}')
-    task = wire._Task(wire._Estimate(query, FORM), "alice", (), False, False, {})
+    query = wire._Query("distances", MESH_ID, b'{"sources": []}', FORM)
+    task = wire._Task(wire._Run(query, "id/key"), "alice", (), False, False, {})
     with pytest.raises(DamagedMessageError, match="cannot be read"):
         Wire(HERE).decode_task(wire.encode(task))
 

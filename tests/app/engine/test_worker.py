@@ -1,7 +1,6 @@
 """A worker, in this process: what it keeps open, and work that fails or is stopped."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -11,9 +10,16 @@ import numpy as np
 import orjson
 import pytest
 
-from app.encoding import CSV, NPY, Encoded, encode
+from app.encoding import CSV, NPY, encode
 from app.engine.signals import Signals
-from app.engine.work import ComputePart, JoinParts, MeshFromSample, StoreMesh, TaskResult
+from app.engine.work import (
+    ComputePart,
+    JoinParts,
+    MeshFromFile,
+    MeshFromSample,
+    StoreMesh,
+    TaskResult,
+)
 from app.engine.worker import Clock, Worker
 from app.errors import Problem
 from app.queries import DistancesQuery, MatrixQuery, PathQuery
@@ -170,7 +176,7 @@ def test_caches_are_emptied_where_memory_runs_out(
         problem = outcome_of(worker, distances_query(mesh_id))
 
     assert isinstance(problem, Problem)
-    assert (problem.code, problem.setting) == ("memory_limit", "GEODESIC_WORKER_MEMORY_BYTES")
+    assert (problem.code, problem.setting) == ("memory_limit", "worker_memory_bytes")
     assert worker.fields.nbytes == 0
     assert opened == [mesh_id]
     assert code_of(worker, distances_query(mesh_id)) is None
@@ -295,6 +301,25 @@ def test_work_that_is_asked_to_stop_stops(tmp_path: Path, accuracy: dict[str, An
     assert "encode" in outcome.seconds
 
 
+@pytest.mark.parametrize("kind", ["off", "json", "sample"])
+def test_making_a_mesh_stops_when_asked_to(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / f"a.{kind}"
+    path.write_text(
+        '{"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}'
+        if kind == "json"
+        else "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    )
+    from_file = MeshFromFile(path, kind, "none")
+    work = StoreMesh(
+        MeshFromSample("plane", 10, "none") if kind == "sample" else from_file, tmp_path / "mesh"
+    )
+    worker = Worker(worker_config(tmp_path), Signals(stop_number=2))
+
+    assert worker.do(2, work) is None
+    assert not work.folder.exists()
+    assert isinstance(worker.do(3, work), TaskResult)
+
+
 def test_an_answer_that_is_stopped_while_it_is_written_leaves_no_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -303,15 +328,15 @@ def test_an_answer_that_is_stopped_while_it_is_written_leaves_no_file(
     mesh_id = store_mesh(tmp_path, samples.sphere(20_000))
     work = run_query(distances_query(mesh_id), CSV)
 
-    def encode_and_stop(*arguments: Any) -> Encoded:
+    def encode_and_stop(*arguments: Any) -> Any:
         def parts() -> Iterator[Any]:
-            first, second, *others = encoded.parts
+            first, second, *others = body
             yield from (first, second)
             signals.stop_number = 1
             yield from others
 
-        encoded = encode(*arguments)
-        return replace(encoded, parts=parts())
+        body, headers = encode(*arguments)
+        return parts(), headers
 
     monkeypatch.setattr("app.engine.worker.encode", encode_and_stop)
 
@@ -330,7 +355,7 @@ def test_a_large_matrix_that_is_stopped_while_its_file_is_read_leaves_no_file(
     mesh_id = store_mesh(tmp_path, samples.sphere(100))
     query = MatrixQuery(mesh_id, MatrixRequest(sources="all", targets="all"))
     write = MatrixParts.write
-    part = worker.do(1, ComputePart(query, "float64", 0, f"{mesh_id}/part"))
+    part = worker.do(1, ComputePart(query, 0, f"{mesh_id}/part"))
     assert isinstance(part, TaskResult)
     before = set(tmp_path.glob("results/*/*"))
 
@@ -340,6 +365,6 @@ def test_a_large_matrix_that_is_stopped_while_its_file_is_read_leaves_no_file(
 
     monkeypatch.setattr(MatrixParts, "write", write_and_stop)
 
-    work = JoinParts(query, "float64", [f"{mesh_id}/part"], 1, f"{mesh_id}/whole")
+    work = JoinParts(query, [f"{mesh_id}/part"], 1, f"{mesh_id}/whole")
     assert worker.do(2, work) is None
     assert set(tmp_path.glob("results/*/*")) == before

@@ -20,10 +20,10 @@ def test_index(client: TestClient) -> None:
 def test_about_tells_the_limits_in_force(client: TestClient) -> None:
     about = client.get("/v1").json()
 
-    assert about["limits"]["GEODESIC_MAX_FACES"] == 5_000_000
-    assert isinstance(about["limits"]["GEODESIC_MAX_FACES"], int)
-    assert about["limits"]["GEODESIC_WORKER_MEMORY_BYTES"] >= 2**30
-    assert "GEODESIC_RATE_LIMIT" not in about["limits"]
+    assert about["limits"]["max_faces"] == 5_000_000
+    assert isinstance(about["limits"]["max_faces"], int)
+    assert about["limits"]["worker_memory_bytes"] >= 2**30
+    assert "rate_limit" not in about["limits"]
     assert about["answer_formats"]["npy"] == "application/x-npy"
     assert "ply" in about["mesh_formats"]
     assert about["methods"] == ["exact", "approximate", "fast"]

@@ -64,7 +64,7 @@ def test_and_under_no_others(name: str, method: str) -> None:
         assert response.status_code == 421
         return
     problem = check_problem(response, 421, "host_not_allowed")
-    assert problem["setting"] == "GEODESIC_ALLOWED_HOSTS"
+    assert problem["setting"] == "allowed_hosts"
 
 
 def test_two_names_are_none() -> None:
@@ -108,9 +108,17 @@ def test_a_page_elsewhere_changes_nothing(origin: str, method: str, keys: str) -
     client = client_at(LOOPBACK, api_keys=keys)
     response = client.request(method, "/v1", headers={"Origin": origin})
     problem = check_problem(response, 403, "origin_not_allowed")
-    assert problem["setting"] == "GEODESIC_CORS_ORIGINS"
+    assert problem["setting"] == "cors_origins"
     assert status(client, method, Origin=origin, Sec_Fetch_Site="cross-site") == 403
     assert status(client, method, Origin=origin, Sec_Fetch_Site="same-site") == 403
+
+
+@pytest.mark.parametrize("site", ["cross-site", "same-site"])
+@pytest.mark.parametrize("method", CHANGING)
+def test_nor_does_one_whose_origin_the_browser_keeps_back(method: str, site: str) -> None:
+    response = client_at(LOOPBACK).request(method, "/v1", headers={"Sec-Fetch-Site": site})
+    check_problem(response, 403, "origin_not_allowed")
+    assert status(client_at(LOOPBACK, cors_origins=("*",)), method, Sec_Fetch_Site=site) == 200
 
 
 @pytest.mark.parametrize("origin", FOREIGN_ORIGINS)

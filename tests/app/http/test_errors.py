@@ -17,7 +17,7 @@ from geodesic_core import errors as core
 from tests.support.service import check_problem
 
 CONTRACT = {
-    400: {"malformed_body", "malformed_request"},
+    400: {"malformed_body", "malformed_request", "idempotency_key_unused"},
     401: {"unauthorized"},
     403: {"forbidden", "origin_not_allowed"},
     404: {"mesh_not_found", "job_not_found", "not_found"},
@@ -77,6 +77,7 @@ def test_unknown_code(client: TestClient) -> None:
     [
         (core.InvalidMesh("bad"), "invalid_mesh"),
         (core.TooManyFaces(9, 7), "limit_exceeded"),
+        (core.TooManyVertices(9, 7), "limit_exceeded"),
         (core.InvalidPoint("bad"), "invalid_point"),
         (core.InvalidArgument("bad"), "invalid_request"),
         (core.DeadlineExceeded("late"), "deadline_exceeded"),
@@ -111,8 +112,9 @@ def test_invalid_mesh_names_its_elements() -> None:
 @pytest.mark.parametrize(
     ("error", "setting"),
     [
-        (core.TooManyFaces(9, 7), "GEODESIC_MAX_FACES"),
-        (core.MemoryLimitExceeded(9, 7), "GEODESIC_QUERY_MEMORY_BYTES"),
+        (core.TooManyFaces(9, 7), "max_faces"),
+        (core.TooManyVertices(9, 7), "max_vertices"),
+        (core.MemoryLimitExceeded(9, 7), "query_memory_bytes"),
     ],
 )
 def test_limits_are_named(error: Exception, setting: str) -> None:

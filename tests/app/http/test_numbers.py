@@ -10,7 +10,6 @@ from pydantic import create_model
 
 from app.http.routes.query_route import read
 from app.queries import KINDS
-from app.schemas.requests import PathParameters
 from app.settings import Settings
 
 POINTS = [
@@ -31,6 +30,7 @@ LINES = {"sources": SOURCES, "chord_error": 1, **LIMITS}
 BODIES: dict[str, dict[str, Any]] = {
     "distances": {"sources": SOURCES, "targets": POINTS, "effort": 2, **ACCURACY, **LIMITS},
     "path": {"source": 1, "target": 2, "waypoints": POINTS, "effort": 4, **ACCURACY, **LIMITS},
+    "steps": {"source": 1, "target": 2, "waypoints": POINTS, **LIMITS},
     "paths": {"source": 1, "targets": POINTS, "effort": 8, **ACCURACY, **LIMITS},
     "isolines": {"levels": [1, 1.5], "count": 3, **LINES, **ACCURACY},
     "borders": LINES,
@@ -80,10 +80,3 @@ def test_numbers_in_quotes_are_refused(kind: str) -> None:
 def test_integers_are_numbers_as_well(kind: str) -> None:
     limit = read_body(kind, BODIES[kind]).max_distance
     assert (limit, type(limit)) == (BODIES[kind]["max_distance"], float)
-
-
-def test_the_numbers_of_an_address_are_texts() -> None:
-    numbers = {"relative_error": "1e-3", "absolute_error": "2", "max_distance": ".5", "effort": "4"}
-    found = PathParameters.model_validate({"from": "0", "to": "1", **numbers})
-    assert (found.relative_error, found.absolute_error) == (0.001, 2.0)
-    assert (found.max_distance, found.effort) == (0.5, 4)

@@ -50,7 +50,7 @@ def test_without_a_page_there_is_no_reference(
 
     problem = check_problem(client.get("/docs"), 404, "not_found")
 
-    assert "/openapi.json" in problem["detail"]
+    assert "openapi.json" in problem["detail"]
 
 
 @pytest.mark.usefixtures("built")

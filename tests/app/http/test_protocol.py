@@ -17,6 +17,7 @@ from app.http.protocol import (
     BYTES_BESIDE_HEADER,
     FREE_CHUNKS,
     LEAST_CHUNK,
+    MOST_DRAINED,
     MOST_HEAD_BYTES,
     MOST_PIPELINED,
 )
@@ -72,8 +73,10 @@ ENDLESS = {
 @pytest.mark.parametrize("name", ENDLESS)
 def test_a_head_without_end_is_refused(listener: Listener, name: str) -> None:
     listener.parsed_bytes.clear()
+    listener.drained_bytes.clear()
     check_problem(listener.send(ENDLESS[name]), 431, "header_too_large")
     assert sum(listener.parsed_bytes) <= MOST_HEAD_BYTES + 2 * LARGEST_READ
+    assert sum(listener.drained_bytes) <= MOST_DRAINED + LARGEST_READ
     assert is_alive(listener)
 
 
@@ -323,11 +326,11 @@ def test_connections_are_limited_altogether_and_for_each_caller(tmp_path: Path) 
     with listening(few) as listener:
         refused = check_each(listener, 2, 429, "rate_limited")
         assert refused["limit"] == 2
-        assert refused["setting"] == "GEODESIC_MAX_CALLER_CONNECTIONS"
+        assert refused["setting"] == "max_caller_connections"
     all_alike = Settings(store=tmp_path, max_connections=3, max_caller_connections=3)
     with listening(all_alike) as listener:
         refused = check_each(listener, 3, 503, "too_many_connections")
-        assert refused["setting"] == "GEODESIC_MAX_CONNECTIONS"
+        assert refused["setting"] == "max_connections"
 
 
 def check_each(listener: Listener, limit: int, status: int, code: str) -> dict[str, object]:

@@ -37,7 +37,7 @@ def test_as_many_as_the_rate_at_once_then_one_by_one(clock: Clock) -> None:
     assert [refusal_of(limits, ALICE) for _ in range(3)] == [None] * 3
     refused: Any = refusal_of(limits, ALICE)
     assert (refused.code, refused.limit, refused.actual) == ("rate_limited", 3, 4)
-    assert refused.setting == "GEODESIC_RATE_LIMIT"
+    assert refused.setting == "rate_limit"
     assert refused.headers == {"Retry-After": "20"}
     assert refusal_of(limits, BOB) is None
 
@@ -71,7 +71,7 @@ def test_requests_at_the_same_time() -> None:
         with limits.counting(ALICE):
             refused: Any = refusal_of(limits, ALICE)
             assert (refused.code, refused.limit, refused.actual) == ("rate_limited", 2, 3)
-            assert refused.setting == "GEODESIC_MAX_CONCURRENT"
+            assert refused.setting == "max_concurrent"
             assert refused.headers == {"Retry-After": "1"}
             assert refusal_of(limits, BOB) is None
         assert refusal_of(limits, ALICE) is None
@@ -92,7 +92,7 @@ def test_a_request_too_many_at_once_costs_no_rate() -> None:
     limits = RateLimits(a_minute=2, at_once=1)
 
     with limits.counting(ALICE):
-        assert refusal_of(limits, ALICE).setting == "GEODESIC_MAX_CONCURRENT"  # type: ignore[union-attr]
+        assert refusal_of(limits, ALICE).setting == "max_concurrent"  # type: ignore[union-attr]
     assert refusal_of(limits, ALICE) is None
 
 

@@ -1,23 +1,19 @@
 """Refused bodies: however many elements are faulty, few are looked at."""
 
 from contextlib import nullcontext
-from pathlib import Path
 from typing import Any
 
-import anyio
 import pytest
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, TypeAdapter, ValidationError, create_model
-from starlette.requests import Request
 
 from app.errors import ProblemError
+from app.http import large_bodies
 from app.http.routes import query_request
 from app.http.routes.query_route import read
-from app.main import create_app
 from app.queries import KINDS
 from app.schemas.points import Curve, CurveSource
 from app.settings import Settings
-from tests.support.waiting import LONG_S
 
 MODELS = [query.model for query in KINDS.values()]
 LISTS = [
@@ -42,7 +38,7 @@ def errors_of(model: type[BaseModel], body: dict[str, Any]) -> list[Any]:
 
 
 def test_all_lists_of_all_queries_are_tested() -> None:
-    assert len(LISTS) == 21
+    assert len(LISTS) == 23
 
 
 @pytest.mark.parametrize(("model", "name"), LISTS)
@@ -122,7 +118,7 @@ def test_a_body_of_more_values_is_not_parsed(count: int, monkeypatch: pytest.Mon
         read(DISTANCES, {}, with_sources(count), SETTINGS)
     problem = refused.value.problem
     assert (problem.code, problem.actual, problem.limit) == ("limit_exceeded", count, MOST_VALUES)
-    assert problem.setting == "GEODESIC_MAX_QUERY_BYTES"
+    assert problem.setting == "max_query_bytes"
 
 
 @pytest.mark.parametrize("most_bytes", [1_000, 2**16, 2**18])
@@ -134,24 +130,11 @@ def test_a_body_of_64_kib_may_hold_any_number_of_values(most_bytes: int) -> None
 
 @pytest.mark.parametrize("fails", [False, True])
 def test_reading_a_large_body_rests_as_long_as_it_held_the_interpreter(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fails: bool
+    monkeypatch: pytest.MonkeyPatch, fails: bool
 ) -> None:
     clock, rests = iter([1.0, 3.5]), []
-    monkeypatch.setattr(query_request, "thread_time", lambda: next(clock))
-    monkeypatch.setattr(query_request, "sleep", rests.append)
-
-    async def receive() -> Any:
-        if parts:
-            return parts.pop()
-        return await anyio.sleep_forever()
-
-    async def ask() -> int:
-        app = create_app(Settings(store=tmp_path, workers=1))
-        request = Request({"type": "http", "app": app}, receive)
-        return await query_request.offload_if_large(request, LONG_S, lambda: 1 // (not fails))
-
-    parts = [{"type": "http.request", "body": b"1" * query_request.LARGE}]
-
+    monkeypatch.setattr(large_bodies, "thread_time", lambda: next(clock))
+    monkeypatch.setattr(large_bodies, "sleep", rests.append)
     with pytest.raises(ZeroDivisionError) if fails else nullcontext():
-        assert anyio.run(ask) == 1
+        assert large_bodies.at_half_pace(lambda: 1 // (not fails)) == 1
     assert rests == [2.5]

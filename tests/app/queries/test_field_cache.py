@@ -24,7 +24,7 @@ def opened() -> OpenMesh:
 def ask(opened: OpenMesh, fields: FieldCache, kind: Any, **body: Any) -> bytes:
     query = kind("id", kind.normalized(kind.model(**body)))
     answer = query.answer(opened, context(fields=fields))
-    return b"".join(encode(answer, Representation("application/json")).parts)
+    return b"".join(encode(answer, Representation("application/json"))[0])
 
 
 SOURCES = [{"vertex": 3}, {"face": 70, "barycentric": [0.2, 0.3, 0.5], "start_distance": 0.1}]
@@ -99,7 +99,6 @@ def test_on_rough_meshes_approximate_and_exact_questions_have_one_field(
 
     assert len(sweeps) == 1
     assert [answer.pop("method") for answer in answers] == ["exact", "approximate"]
-    assert [answer.pop("exact") for answer in answers] == [True, False]
     assert answers[0] == answers[1]
 
 

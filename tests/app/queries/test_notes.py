@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from app.encoding import Representation
-from app.queries import KINDS, ExecutionContext, MeshSize, Query, estimate
+from app.queries import KINDS, ExecutionContext, MeshSize, Query
 from app.queries.points import FAR_SHARE
 from app.store.meshes import OpenMesh
 
@@ -115,13 +114,7 @@ def test_warnings_of_the_mesh_come_first() -> None:
     assert AWAY in second
 
 
-def test_parts_of_a_matrix_and_estimates_have_the_notes() -> None:
+def test_parts_of_a_matrix_have_the_notes() -> None:
     query, opened = asked("matrix", sources=[FAR, 0], targets="all")
     answer = query.answer_of_parts(opened, 50, lambda: False)
     assert AWAY in answer.members["warnings"][0]
-    allowed, _ = asked("matrix", sources=[FAR | {"max_distance": 24.0}, 0], targets="all")
-    sizes = [
-        estimate(each, Representation("application/json"), opened, lambda: False).response_bytes
-        for each in (query, allowed)
-    ]
-    assert sizes[0] - sizes[1] > len(AWAY)

@@ -34,12 +34,12 @@ class FullEngine(DirectEngine):
 def test_a_job_is_done_though_the_same_query_of_a_client_is_refused(tmp_path: Path) -> None:
     """The job joined it while it was on its way."""
     store = Store(tmp_path, store_mesh(tmp_path, MESH))
-    question = store.question(NPY)
+    query = store.query(NPY)
 
     async def main() -> None:
         async with asyncio.timeout(LONG_S), store.service() as (service, _):
             engine = service.answering.engine = FullEngine(tmp_path)
-            answering = service.answering.answer(question, CONTEXT.deadline_s, as_file=False)
+            answering = service.answering.answer(query, CONTEXT, as_file=False)
             asked = asyncio.create_task(answering)
             await engine.asked.wait()
             job_id = await store.submit(service, NPY)

@@ -13,6 +13,7 @@ from app.store.folder_meshes import FolderMeshes
 from app.store.mesh_catalog import CatalogChange, MeshCatalog
 from app.store.meshes import MeshStore
 from tests.support.databases import opened
+from tests.support.service import scratch_folder
 
 
 class Replica:
@@ -23,7 +24,6 @@ class Replica:
     ) -> None:
         self.store = MeshStore(root)
         self.catalog = MeshCatalog(
-            root,
             FolderMeshes(root),
             capacity,
             evicts=True,
@@ -36,7 +36,7 @@ class Replica:
         sample = gc.samples.plane(50)
         vertices, faces = sample.vertices, sample.faces
         mesh = gc.TriangleMesh(vertices * scale, faces)
-        async with self.catalog.scratch_folder() as folder:
+        async with scratch_folder(self.store) as folder:
             written = self.store.write_aside(mesh, folder / "mesh", owner)
             return written.mesh_id, await self.catalog.add(written)
 
@@ -47,7 +47,7 @@ async def started(
     first, second = (Replica(root, database, capacity, quota) for _ in range(2))
     first.catalog.prepare()
     await first.catalog.reconcile()
-    second.catalog.prepare(is_alone=False)
+    second.catalog.prepare()
     await second.catalog.keep_up()
     return first, second
 

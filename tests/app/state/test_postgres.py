@@ -133,9 +133,7 @@ def test_those_who_wait_for_the_meshes_leave_connections_to_others(
     url = postgres.new_database()
     ours, others = PostgresDatabase(url), PostgresDatabase(url)
     ours.prepare()
-    catalog = MeshCatalog(
-        tmp_path, FolderMeshes(tmp_path), 2**30, evicts=True, shared=MeshRecords(ours)
-    )
+    catalog = MeshCatalog(FolderMeshes(tmp_path), 2**30, evicts=True, shared=MeshRecords(ours))
 
     async def wait_for_meshes() -> None:
         with suppress(StateUnavailableError):  # it may take too long

@@ -32,11 +32,13 @@ from app.store.layout import LAYOUT, StoreError, require_layout
 from app.store.mesh_catalog import CatalogChange, MeshCatalog
 from app.store.meshes import MeshStore, WrittenMesh
 from app.store.ownership import owned
+from app.store.scratch import Scratch
 from tests.support.disks import fill_disk
 from tests.support.paths import ROOT
 from tests.support.service import (
     check_problem,
     distances,
+    scratch_folder,
     serving,
     store_mesh,
     upload_sample,
@@ -235,8 +237,9 @@ def opened(
     root: Path, capacity: int = 2**60, *, evicts: bool = False, quota: int | None = None
 ) -> Iterator[Store]:
     store = MeshStore(root)
-    catalog = MeshCatalog(root, FolderMeshes(root), capacity, evicts=evicts, quota=quota)
+    catalog = MeshCatalog(FolderMeshes(root), capacity, evicts=evicts, quota=quota)
     with owned(root):
+        Scratch(root, 1).prepare()
         catalog.prepare()
         yield store, catalog
 
@@ -247,7 +250,7 @@ def add(
     store, catalog = opened
 
     async def run() -> tuple[str, CatalogChange]:
-        async with catalog.scratch_folder() as folder:
+        async with scratch_folder(store) as folder:
             written = store.write_aside(mesh, folder / "mesh", owner, "plane")
             change = await catalog.add(written)
             assert change is not None
@@ -273,7 +276,7 @@ def test_what_finds_no_room_is_refused_and_leaves_nothing(tmp_path: Path) -> Non
         problem = caught.value.problem
         assert problem.code == "storage_full"
         assert (problem.limit, problem.actual) == (first + second - 1, first + second)
-        assert problem.setting == "GEODESIC_STORE_BYTES"
+        assert problem.setting == "store_bytes"
         assert files_in(tmp_path / "store") == before
         assert add(store, plane(50)) == (mesh_id, CatalogChange(is_new=False)), "it takes no room"
         anyio.run(store[1].delete, mesh_id)
@@ -321,7 +324,7 @@ def check_quota(store: Store, mesh_id: str, owner: str | None, wanted: int, quot
     problem = caught.value.problem
     assert (problem.code, problem.status) == ("quota_exceeded", 507)
     assert (problem.limit, problem.actual) == (quota, wanted)
-    assert problem.setting == "GEODESIC_QUOTA_BYTES"
+    assert problem.setting == "quota_bytes"
     assert files_in(store[0].folder) == before
 
     assert add(store, plane(50), owner) == (mesh_id, CatalogChange(is_new=False))
@@ -339,7 +342,7 @@ def test_of_two_uploads_at_the_same_time_the_quota_takes_one(tmp_path: Path) -> 
         ends: list[str] = []
 
         async def add_one(faces: int) -> None:
-            async with catalog.scratch_folder() as folder:
+            async with scratch_folder(store) as folder:
                 written = store.write_aside(plane(faces), folder / "mesh", "alice")
                 await anyio.sleep(0)  # both are written before either is added
                 try:
@@ -428,7 +431,7 @@ def test_two_that_write_one_mesh(tmp_path: Path) -> None:
         meshes, catalog = store
 
         async def run() -> list[bool]:
-            async with catalog.scratch_folder() as folder:
+            async with scratch_folder(meshes) as folder:
                 both = [meshes.write_aside(plane(), folder / name, None) for name in "ab"]
                 kept = await asyncio.gather(*map(catalog.add, both))
                 return [each.is_new for each in kept]
@@ -446,7 +449,7 @@ def test_uploads_at_the_same_time_do_not_exceed_the_bound(tmp_path: Path) -> Non
         meshes, catalog = store
 
         async def run() -> list[Any]:
-            async with catalog.scratch_folder() as folder:
+            async with scratch_folder(meshes) as folder:
                 written = [
                     meshes.write_aside(plane(faces), folder / str(faces), None) for faces in kinds
                 ]
@@ -469,7 +472,7 @@ def test_over_http(tmp_path: Path) -> None:
         upload_sample(client, "plane", 72)
         sample = {"sample": "plane", "faces": 32}
         problem = check_problem(client.post("/v1/meshes", params=sample), 507, "storage_full")
-        assert (problem["limit"], problem["setting"]) == (room, "GEODESIC_STORE_BYTES")
+        assert (problem["limit"], problem["setting"]) == (room, "store_bytes")
         assert problem["actual"] > room
         assert files_in(store / "tmp") == set()
         assert distances(client, first).status_code == 200, "as is used after the other"

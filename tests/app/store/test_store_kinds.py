@@ -18,6 +18,7 @@ from app.store.choice import store_of
 from app.store.folder_store import FolderStore
 from app.store.interface import Store
 from app.store.layout import RESULTS, TEMPORARY, StoreError
+from app.store.mesh_index import MeshIndex
 from app.store.meshes import MeshStore, WrittenMesh
 from app.store.object_store import ObjectStore
 from app.store.objects import Objects
@@ -171,14 +172,19 @@ async def test_a_mesh_that_is_not_there(machines: Machines, mesh_id: str) -> Non
 @pytest.mark.anyio
 async def test_meshes_are_listed_in_pages(machines: Machines) -> None:
     one, two = machines
-    ids = sorted([await one.put(gc.samples.plane(faces)) for faces in (2, 8, 18)])
-    pages, after = [], ""
-    for _ in range(2):
-        page, more = await two.store.meshes.page(after, 2)
-        pages.append((list(page), more))
-        after = page[-1]
-    assert pages == [(ids[:2], True), (ids[2:], False)]
-    assert await two.store.meshes.page(after, 2) == ([], False)
+    index = MeshIndex(two.store.meshes)
+    assert await index.page(2, "", None) == ([], None)
+    ids = [await one.put(gc.samples.plane(faces)) for faces in (2, 8, 18)]
+    first, cursor = await index.page(2, "", None)
+    second, end = await index.page(2, cursor or "", None)
+    found = [*first, *second]
+    assert (len(first), end) == (2, None)
+    assert {each["id"] for each in found} == set(ids)
+    times = [each["created"] for each in found]
+    assert times == sorted(times, reverse=True)
+    assert await index.page(2, "", "no such name") == ([], None)
+    await two.store.meshes.remove(ids[0])
+    assert {each["id"] for each in (await index.page(9, "", None))[0]} == set(ids[1:])
 
 
 @pytest.mark.anyio

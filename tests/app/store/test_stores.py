@@ -223,7 +223,7 @@ def test_the_answer_of_a_job_stays_where_a_start_has_to_make_room(
 
     restarted = ResultStore(FolderResults(tmp_path / "results"), 50, memory=0)
     restarted.prepare()
-    restarted.pin("m/job")
+    restarted.pin("m/job", None)
     restarted.make_room()
 
     assert find(restarted, "m/job") is not None
@@ -313,16 +313,16 @@ def test_the_memory_of_small_results_is_counted_whole(tmp_path: Path) -> None:
 
 def test_what_is_held_stays_until_it_is_released(results: ResultStore, tmp_path: Path) -> None:
     put(results, tmp_path, "m/a")
-    results.pin("m/a")
-    assert results.can_pin("m/a")
+    results.pin("m/a", None)
     other = results.add(write(tmp_path, "m/b", 61))
-    assert not results.can_pin("m/b")
+    with pytest.raises(ProblemError):
+        results.pin_within_quota("m/b", None)
     results.release(other)
     results.forget_mesh("m")
 
     assert find(results, "m/a") is not None
     assert find(results, "m/b") is None
-    results.unpin("m/a")
+    results.unpin("m/a", None)
     put(results, tmp_path, "m/c", 61)
     assert find(results, "m/a") is None
 
@@ -365,7 +365,7 @@ def test_files_come_when_they_are_needed(
     taken = roomy.add(written, is_reusable=is_reusable)
 
     filed = anyio.run(roomy.with_files, taken)
-    roomy.pin("m/a")
+    roomy.pin("m/a", None)
     roomy.release(filed)
 
     assert roomy.body(filed).read_bytes() == b"x" * 40
@@ -414,21 +414,47 @@ def test_a_large_result_is_read_once_for_each_version_of_its_file(
 def test_room_is_reserved_among_pinned_results(tmp_path: Path) -> None:
     store = ResultStore(FolderResults(tmp_path / "results"), 100, memory=0)
     store.add(write(tmp_path, "m/pinned", 40))
-    store.pin("m/pinned")
+    store.pin("m/pinned", None)
     store.add(write(tmp_path, "m/other", 30))
-    with store.reserving(50):
-        assert not store.can_pin("m/other")
-        with pytest.raises(ProblemError) as refused, store.reserving(11):
+    with store.reserving(None, 50):
+        with pytest.raises(ProblemError):
+            store.pin_within_quota("m/other", None)
+        with pytest.raises(ProblemError) as refused, store.reserving(None, 11):
             pass
         problem = refused.value.problem
         assert (problem.code, problem.limit, problem.actual) == ("storage_full", 100, 101)
-        assert problem.setting == "GEODESIC_RESULTS_BYTES"
-        with store.reserving(0) as reserve:
+        assert problem.setting == "results_bytes"
+        with store.reserving(None, 0) as reserve:
             reserve(6)
             reserve(4)
             with pytest.raises(ProblemError) as refused:
                 reserve(1)
             assert refused.value.problem.code == "storage_full"
-        with store.reserving(10):
+        with store.reserving(None, 10):
             pass
-    assert store.can_pin("m/other")
+    store.pin_within_quota("m/other", None)
+
+
+def test_the_answers_of_one_owner_s_jobs_leave_room_for_others(tmp_path: Path) -> None:
+    """Both what is pinned and what is reserved count; a shared answer counts for each owner."""
+    store = ResultStore(FolderResults(tmp_path / "results"), 100, memory=0, quota=50)
+    for name in ("m/a", "m/b", "m/c"):
+        store.add(write(tmp_path, name, 30))
+    store.pin_within_quota("m/a", "alice")
+    store.pin_within_quota("m/a", "alice")
+    with pytest.raises(ProblemError) as refused:
+        store.pin_within_quota("m/b", "alice")
+    problem = refused.value.problem
+    assert (problem.code, problem.status) == ("quota_exceeded", 507)
+    assert (problem.limit, problem.actual) == (50, 60)
+    assert problem.setting == "quota_results_bytes"
+    with store.reserving("alice", 20):
+        with pytest.raises(ProblemError):
+            store.refuse_without_room("alice", 1)
+        with pytest.raises(ProblemError):
+            store.pin_within_quota("m/b", "alice")
+        store.pin_within_quota("m/a", "bob")
+        store.refuse_without_room("bob", 20)
+    store.unpin("m/a", "alice")
+    store.unpin("m/a", "alice")
+    store.pin_within_quota("m/b", "alice")

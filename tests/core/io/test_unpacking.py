@@ -8,6 +8,7 @@ import os
 import tempfile
 import zipfile
 from collections.abc import Callable
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.errors import FileTooLarge, InvalidMesh
+from geodesic_core.errors import Cancelled, FileTooLarge, InvalidMesh
 from tests.support.mesh_files import glb, obj, off, ply, ply_binary, stl_binary
 
 pytestmark = pytest.mark.slice(8)
@@ -110,6 +111,21 @@ def test_the_size_when_unpacked_counts(pack: Callable[[bytes], bytes]) -> None:
     assert len(bomb) < 100_000
     with pytest.raises(FileTooLarge):
         gc.load_mesh(bomb, "obj", max_bytes=1_000_000)
+
+
+@pytest.mark.parametrize("pack", [bytes, *PACKERS.values(), zipped])
+def test_reading_stops_between_its_steps(pack: Callable[[bytes], bytes]) -> None:
+    """Whenever the answer becomes yes, it stops there, and asks no more."""
+    data = pack(FILES["obj"])
+    asked = count()
+    gc.load_mesh(data, "obj", cancel=lambda: next(asked) < 0)
+    steps = next(asked)
+    assert steps >= 2
+    for last in range(steps):
+        asked = count()
+        with pytest.raises(Cancelled):
+            gc.load_mesh(data, "obj", cancel=lambda: next(asked) == last)  # noqa: B023
+        assert next(asked) == last + 1
 
 
 ENCODINGS = ("utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32", "utf-32-be")

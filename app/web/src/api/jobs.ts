@@ -32,11 +32,10 @@ export async function answerOf(
   }
 }
 
-/** Remove a job, if the service can do so now; stop it first if it has not finished. */
+/** Remove a job, if the service can do so now; that stops it as well. */
 async function remove(path: string): Promise<void> {
   try {
-    const last = (await (await call(path, { method: "DELETE" })).json()) as Job;
-    if (last.status === "dismissed") await call(path, { method: "DELETE" });
+    await call(path, { method: "DELETE" });
   } catch {
     // The service removes it later.
   }

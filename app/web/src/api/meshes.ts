@@ -6,17 +6,17 @@ import type { MeshDocument, MeshList } from "./types";
 /** List up to a hundred meshes, from the start or after a cursor. */
 export function listMeshes(cursor: string | null): Promise<MeshList> {
   const after = cursor === null ? {} : { cursor };
-  return getJson(`/v1/meshes?${new URLSearchParams({ limit: "100", ...after })}`);
+  return getJson(`v1/meshes?${new URLSearchParams({ limit: "100", ...after })}`);
 }
 
 export function getMesh(id: string): Promise<MeshDocument> {
-  return getJson(`/v1/meshes/${encodeURIComponent(id)}`);
+  return getJson(`v1/meshes/${encodeURIComponent(id)}`);
 }
 
 export async function makeSample(name: string, faces: number): Promise<MeshDocument> {
   const parameters = new URLSearchParams({ sample: name, faces: String(faces) });
   return (
-    await call(`/v1/meshes?${parameters}`, { method: "POST" })
+    await call(`v1/meshes?${parameters}`, { method: "POST" })
   ).json() as Promise<MeshDocument>;
 }
 
@@ -35,7 +35,7 @@ export function uploadMesh(
   form.set("file", file);
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
-    request.open("POST", `/v1/meshes?merge=${merge}`);
+    request.open("POST", `v1/meshes?merge=${merge}`);
     for (const [name, value] of Object.entries(authorization())) {
       request.setRequestHeader(name, value);
     }

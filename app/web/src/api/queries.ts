@@ -13,6 +13,8 @@ import type {
   Outline,
   Point,
   ResolvedPoint,
+  Step,
+  StepsAnswer,
   Unreachable,
 } from "./types";
 
@@ -38,7 +40,7 @@ export async function askDistances(
   onProgress: (share: number) => void,
   signal: AbortSignal,
 ): Promise<Field> {
-  const path = `/v1/meshes/${mesh}/distances`;
+  const path = `v1/meshes/${mesh}/distances`;
   const response = await answerOf(path, question, NPY, onProgress, signal);
   const distances = parseNpy(await response.arrayBuffer()).data as Float64Array;
   return {
@@ -58,7 +60,7 @@ export async function askTerritories(
   signal: AbortSignal,
 ): Promise<Int32Array> {
   const body = { ...question, include: ["nearest_source"] };
-  const response = await post(`/v1/meshes/${mesh}/distances`, body, {}, signal);
+  const response = await post(`v1/meshes/${mesh}/distances`, body, {}, signal);
   const { nearest_source } = (await response.json()) as DistancesAnswer;
   return Int32Array.from(nearest_source ?? [], (source) => source ?? -1);
 }
@@ -72,7 +74,7 @@ export async function askIsolines(
   onProgress: (share: number) => void,
   signal: AbortSignal,
 ): Promise<IsolinesAnswer> {
-  const path = `/v1/meshes/${mesh}/isolines`;
+  const path = `v1/meshes/${mesh}/isolines`;
   const response = await answerOf(path, question, JSON_TYPE, onProgress, signal);
   return response.json() as Promise<IsolinesAnswer>;
 }
@@ -86,7 +88,7 @@ export async function askBorders(
   onProgress: (share: number) => void,
   signal: AbortSignal,
 ): Promise<BordersAnswer> {
-  const path = `/v1/meshes/${mesh}/borders`;
+  const path = `v1/meshes/${mesh}/borders`;
   const response = await answerOf(path, question, JSON_TYPE, onProgress, signal);
   return response.json() as Promise<BordersAnswer>;
 }
@@ -96,7 +98,6 @@ export interface RouteQuestion {
   target: Point;
   waypoints: Point[];
   barriers: number[];
-  explain: boolean;
 }
 
 /** Return the shortest path; of several sources, it starts at the nearest. */
@@ -107,8 +108,20 @@ export async function askRoute(
 ): Promise<Outline> {
   const { sources, ...rest } = question;
   const source = sources[await nearestSource(mesh, question, signal)];
-  const response = await post(`/v1/meshes/${mesh}/path`, { source, ...rest }, {}, signal);
+  const response = await post(`v1/meshes/${mesh}/path`, { source, ...rest }, {}, signal);
   return response.json() as Promise<Outline>;
+}
+
+/** Return the steps of the search for the shortest path. */
+export async function askSteps(
+  mesh: string,
+  question: RouteQuestion,
+  signal: AbortSignal,
+): Promise<Step[]> {
+  const { sources, ...rest } = question;
+  const source = sources[await nearestSource(mesh, question, signal)];
+  const response = await post(`v1/meshes/${mesh}/path/steps`, { source, ...rest }, {}, signal);
+  return ((await response.json()) as StepsAnswer).steps;
 }
 
 async function nearestSource(
@@ -119,7 +132,7 @@ async function nearestSource(
   if (sources.length === 1) return 0;
   const first = waypoints[0] ?? target;
   const body = { sources, targets: [first], barriers, include: ["nearest_source"] };
-  const response = await post(`/v1/meshes/${mesh}/distances`, body, {}, signal);
+  const response = await post(`v1/meshes/${mesh}/distances`, body, {}, signal);
   return ((await response.json()) as DistancesAnswer).nearest_source?.[0] ?? 0;
 }
 
@@ -128,7 +141,7 @@ export async function locate(
   mesh: string,
   position: [number, number, number],
 ): Promise<{ point: Point; distance: number }> {
-  const response = await post(`/v1/meshes/${mesh}/locate`, { points: [position] });
+  const response = await post(`v1/meshes/${mesh}/locate`, { points: [position] });
   const [found] = ((await response.json()) as LocateAnswer).points;
   if (!found) throw new Error("The service found no point of the surface there.");
   return { point: pointOf(found), distance: found.distance };
@@ -142,7 +155,7 @@ export function pointOf({ vertex, face, barycentric }: Partial<ResolvedPoint>): 
 }
 
 export function getAbout(): Promise<About> {
-  return getJson("/v1");
+  return getJson("v1");
 }
 
 function jsonHeader<T>(response: Response, name: string): T {

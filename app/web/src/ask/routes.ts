@@ -1,8 +1,8 @@
 // The shortest path to the target, which follows the pointer, and the steps of its search.
 import { LatestOnly } from "../api/latestOnly";
-import { askRoute, pointOf, type RouteQuestion } from "../api/queries";
+import { askRoute, askSteps, pointOf, type RouteQuestion } from "../api/queries";
 import type { Outline, Point, Step } from "../api/types";
-import { byId, count, duration, written } from "../dom";
+import { byId, count, written } from "../dom";
 import type { Notes } from "../panel/notes";
 import { writePoint } from "../state/point";
 import { type State, unitOf } from "../state/state";
@@ -60,7 +60,7 @@ export class Routes {
     this.requested = requested;
     this.endSteps();
     const hasPath = mesh !== null && target !== null && sources.length > 0 && isReadable;
-    this.request = hasPath ? { mesh, sources, target, waypoints, barriers, explain: false } : null;
+    this.request = hasPath ? { mesh, sources, target, waypoints, barriers } : null;
     byId("explain-start", HTMLButtonElement).disabled = !hasPath;
     if (this.request) {
       this.latestOnly.ask(this.request);
@@ -129,7 +129,7 @@ export class Routes {
     const { outline, unit } = this;
     if (!outline) return;
     const { length } = outline.waypoints;
-    const bound = outline.exact ? "exact" : boundInWords(outline.error_bound);
+    const bound = outline.method === "exact" ? "exact" : boundInWords(outline.error_bound);
     byId("length-note").textContent =
       outline.length == null
         ? reason(outline)
@@ -142,9 +142,9 @@ export class Routes {
     const { mesh, ...question } = request;
     const stop = new AbortController();
     this.status.run("busy", "Searching step by step…", stop, async () => {
-      const outline = await askRoute(mesh, { ...question, explain: true }, stop.signal);
+      const steps = await askSteps(mesh, question, stop.signal);
       if (request !== this.request) return;
-      this.steps = outline.steps ?? [];
+      this.steps = steps;
       byId("explain-start").hidden = true;
       byId("steps").hidden = false;
       const slider = byId("step", HTMLInputElement);
@@ -167,7 +167,7 @@ export class Routes {
     byId("step-words").textContent =
       `${number + 1} of ${this.steps.length}${leg}. ${WORDS[step.name]}. ` +
       `Length at most ${written(step.bound, 6)}; ${count(step.faces.length, "face")}, ` +
-      `${count(step.windows, "window")}, ${duration(step.seconds)}.`;
+      `${count(step.windows, "window")}.`;
   }
 
   private endSteps(): void {

@@ -15,9 +15,9 @@ type Product = "distances" | "path" | "isolines" | "borders";
 
 const FORMATS: Record<Product, string[]> = {
   distances: ["npy", "csv", "ply"],
-  path: ["obj", "svg", "csv"],
-  isolines: ["obj", "svg"],
-  borders: ["obj", "svg"],
+  path: ["obj", "csv"],
+  isolines: ["obj", "csv"],
+  borders: ["obj", "csv"],
 };
 
 export class ExportPanel {
@@ -29,15 +29,15 @@ export class ExportPanel {
     private readonly stage: Stage,
   ) {
     const hasKey = (): boolean => "Authorization" in authorization();
-    const { origin } = location;
+    const service = new URL(".", location.href).href;
     onCopy(
       "copy-link",
       "The link",
-      () => origin + writeState({ ...store.state, view: stage.view }),
+      () => new URL(writeState({ ...store.state, view: stage.view }), service).href,
     );
-    onCopy("copy-curl", "The command", () => curlOf(store.state, this.source(), origin, hasKey()));
+    onCopy("copy-curl", "The command", () => curlOf(store.state, this.source(), service, hasKey()));
     onCopy("copy-python", "The program", () =>
-      pythonOf(store.state, this.source(), origin, hasKey()),
+      pythonOf(store.state, this.source(), service, hasKey()),
     );
     byId("picture").addEventListener("click", () => this.savePicture());
   }
@@ -87,7 +87,7 @@ export class ExportPanel {
     this.status.run("busy", `Fetching ${what}…`, stop, async () => {
       const { mesh } = this.store.state;
       const body = this.bodyOf(what);
-      const path = `/v1/meshes/${mesh}/${what}?format=${format}`;
+      const path = `v1/meshes/${mesh}/${what}?format=${format}`;
       const response = await post(path, body, {}, stop.signal);
       download(await response.blob(), `${what}.${format}`);
     });

@@ -1,6 +1,6 @@
 // Choosing a mesh: from a file, from a sample or from the store.
 import { listMeshes, makeSample, uploadMesh } from "../api/meshes";
-import type { About, MeshDocument } from "../api/types";
+import type { About, ListedMesh, MeshDocument } from "../api/types";
 import { button, byId, count } from "../dom";
 import { InputError } from "../inputError";
 import { type Store, withMesh } from "../state/state";
@@ -152,7 +152,7 @@ export class Meshes {
   }
 }
 
-function nameOf({ id, name, faces }: MeshDocument): string {
+function nameOf({ id, name, faces }: ListedMesh): string {
   return `${name ?? id.slice(0, 8)}, ${count(faces, "face")}`;
 }
 

@@ -11,7 +11,7 @@ interface Query {
 /** Return the query for the path where there is a target, otherwise for the distances. */
 function queryOf(state: State, source: Point): Query {
   const { target, waypoints, barriers } = state;
-  const mesh = `/v1/meshes/${state.mesh}`;
+  const mesh = `v1/meshes/${state.mesh}`;
   if (!target) return { path: `${mesh}/distances`, body: questionOf(state, state.method) };
   const more = {
     ...(waypoints.length > 0 && { waypoints }),
@@ -20,13 +20,13 @@ function queryOf(state: State, source: Point): Query {
   return { path: `${mesh}/path`, body: { source, target, ...more } };
 }
 
-export function curlOf(state: State, source: Point, origin: string, hasKey: boolean): string {
+export function curlOf(state: State, source: Point, service: string, hasKey: boolean): string {
   const { path, body } = queryOf(state, source);
   const key = hasKey ? ` -H "Authorization: Bearer $GEODESIC_KEY"` : "";
-  return `curl '${origin}${path}'${key} -H 'Content-Type: application/json' \\\n  -d '${JSON.stringify(body)}'`;
+  return `curl '${service}${path}'${key} -H 'Content-Type: application/json' \\\n  -d '${JSON.stringify(body)}'`;
 }
 
-export function pythonOf(state: State, source: Point, origin: string, hasKey: boolean): string {
+export function pythonOf(state: State, source: Point, service: string, hasKey: boolean): string {
   const { path, body } = queryOf(state, source);
   const key = hasKey ? `, "Authorization": "Bearer " + os.environ["GEODESIC_KEY"]` : "";
   const results = state.target ? `answer["length"], answer["points"]` : `answer["distances"]`;
@@ -37,7 +37,7 @@ export function pythonOf(state: State, source: Point, origin: string, hasKey: bo
     "",
     `body = json.loads('${JSON.stringify(body)}')`,
     `headers = {"Content-Type": "application/json"${key}}`,
-    `request = Request("${origin}${path}", json.dumps(body).encode(), headers)`,
+    `request = Request("${service}${path}", json.dumps(body).encode(), headers)`,
     "answer = json.load(urlopen(request))",
     `print(${results})`,
     "",

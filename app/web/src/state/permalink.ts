@@ -40,7 +40,7 @@ export function writeState(state: State): string {
   if (state.view) query.set("view", state.view.map((x) => Number(x.toFixed(4))).join(","));
   // Points are easier to read without escapes, which none of these needs in a query.
   const text = query.toString().replaceAll("%2C", ",").replaceAll("%3A", ":");
-  return text ? `/?${text}` : "/";
+  return text ? `?${text}` : ".";
 }
 
 const UPS: readonly Up[] = ["y", "z"];

@@ -14,7 +14,8 @@ type Answer = (sent: Sent) => Response | Promise<Response>;
 /** Replace ``fetch``: the first route whose name begins the request's method and path answers. */
 export function fakeService(routes: Record<string, Answer>): Sent[] {
   const requests: Sent[] = [];
-  vi.stubGlobal("fetch", async (path: string, init: RequestInit = {}): Promise<Response> => {
+  vi.stubGlobal("fetch", async (address: string, init: RequestInit = {}): Promise<Response> => {
+    const path = address.startsWith("/") ? address : `/${address}`; // as from the page at /
     const sent = {
       method: init.method ?? "GET",
       path,

@@ -7,17 +7,17 @@ from typing import Any
 
 import pytest
 
-from tests.support.promises import DOCUMENT, PROMISES, Promise, broken, promises_of
+from tests.support.released import DOCUMENT, RELEASED, breaks, reduced
 
 NOW = json.loads(DOCUMENT.read_bytes())
-KNOWN = {name: Promise(**lines) for name, lines in json.loads(PROMISES.read_bytes()).items()}
 
 
-def test_the_interface_keeps_what_it_promised() -> None:
-    now = promises_of(NOW)
-    assert not KNOWN.keys() - now.keys(), "operations are gone, or have another id"
-    faults = {name: broken(promise, now[name]) for name, promise in KNOWN.items()}
-    assert not any(faults.values()), {name: lines for name, lines in faults.items() if lines}
+def test_clients_of_the_last_release_are_served() -> None:
+    assert breaks(json.loads(RELEASED.read_bytes()), NOW) == []
+
+
+def test_what_is_kept_of_a_release_is_all_that_counts() -> None:
+    assert breaks(reduced(NOW), NOW) == breaks(NOW, reduced(NOW)) == []
 
 
 def schema(document: Any, name: str) -> Any:
@@ -44,6 +44,7 @@ BREAKING: list[Callable[[Any], Any]] = [
     lambda document: schema(document, "ErrorBound")["properties"]["kind"]["enum"].append("new"),
     lambda document: operation(document)["responses"]["200"]["content"].pop("text/csv"),
     lambda document: operation(document)["responses"].pop("202"),
+    lambda document: document["paths"].pop("/v1/meshes"),
 ]
 HARMLESS: list[Callable[[Any], Any]] = [
     lambda document: add_parameter(document, required=False),
@@ -68,5 +69,4 @@ def test_what_harms_nobody_passes(change: Callable[[Any], Any]) -> None:
 def faults_of(change: Callable[[Any], Any]) -> list[str]:
     document = copy.deepcopy(NOW)
     change(document)
-    before, after = promises_of(NOW), promises_of(document)
-    return [line for name, promise in before.items() for line in broken(promise, after[name])]
+    return breaks(NOW, document)
