@@ -5,6 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import geodesic_core as gc
+from tests.support.meshes import mesh_of
 from tests.support.oracles import graph
 from tests.support.random_meshes import cases
 
@@ -31,3 +32,14 @@ def test_no_steeper_than_the_edges_and_between_euclid_and_dijkstra(case, seed):
     assert (distances >= euclid * (1 - 1e-12)).all()
     on_edges = graph.edge_distances(case.vertices, case.faces, source)
     assert (distances <= on_edges * (1 + 1e-12)).all()
+
+
+@given(cases(), seeds, st.floats(0, 2))
+def test_start_distances_are_a_least_of_sums(case, seed, start):
+    mesh = mesh_of(case)
+    ends = [vertex_of(case, seed), vertex_of(case, seed + 1)]
+    field = gc.exact_distance(mesh, [gc.Source(ends[0], start), gc.Source(ends[1])])
+    single = [gc.exact_distance(mesh, end).distances for end in ends]
+    np.testing.assert_allclose(
+        field.distances, np.minimum(single[0] + start, single[1]), rtol=EXACT
+    )
