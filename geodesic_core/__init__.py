@@ -20,8 +20,10 @@ from geodesic_core.errors import GeodesicError
 from geodesic_core.fields.borders import Border
 from geodesic_core.fields.distance_field import DistanceField
 from geodesic_core.fields.isolines import Isoline, resolve_chord_error, spaced_levels
+from geodesic_core.fields.log_map import LogMap, Polar
 from geodesic_core.fields.path import ErrorBound, GeodesicPath, SearchStep
 from geodesic_core.fields.stored_field import load_field
+from geodesic_core.fields.straight_lines import StraightLine
 from geodesic_core.fields.sweep_result import Retain, SweepStats
 from geodesic_core.io.as_mesh import as_mesh
 from geodesic_core.io.label import load_label, load_label_vertices
@@ -32,6 +34,7 @@ from geodesic_core.mesh.barriers import walled_in
 from geodesic_core.mesh.curve import share_a_face
 from geodesic_core.mesh.report import MeshReport, Sample
 from geodesic_core.mesh.surface_point import Curve, Source, SurfacePoint
+from geodesic_core.mesh.tangent_frames import TangentFrames
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.nearest import Nearest
 from geodesic_core.solvers import (
@@ -42,8 +45,10 @@ from geodesic_core.solvers import (
     exact_distance,
     fast_distance,
     kernel_digest,
+    log_map,
     nearest,
     shortest_path,
+    trace,
 )
 from geodesic_core.tolerances import WEIGHT_ERROR
 
@@ -57,17 +62,21 @@ __all__ = [
     "GeodesicError",
     "GeodesicPath",
     "Isoline",
+    "LogMap",
     "MatrixFile",
     "MatrixParts",
     "MeshReport",
     "Nearest",
+    "Polar",
     "Retain",
     "Sample",
     "SearchStep",
     "Solver",
     "Source",
+    "StraightLine",
     "SurfacePoint",
     "SweepStats",
+    "TangentFrames",
     "TriangleMesh",
     "approximate_distance",
     "as_mesh",
@@ -82,12 +91,14 @@ __all__ = [
     "load_label",
     "load_label_vertices",
     "load_mesh",
+    "log_map",
     "nearest",
     "resolve_chord_error",
     "samples",
     "share_a_face",
     "shortest_path",
     "spaced_levels",
+    "trace",
     "walled_in",
     "warm_up",
     "write_matrix",

@@ -19,7 +19,13 @@ from geodesic_core.kernels.jit import cache, machine, progress
 from geodesic_core.matrices.threads import available_cores
 from geodesic_core.mesh.surface_point import Curve, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.solvers import Solver, approximate_distance, exact_distance, fast_distance
+from geodesic_core.solvers import (
+    Solver,
+    approximate_distance,
+    exact_distance,
+    fast_distance,
+    log_map,
+)
 from geodesic_core.validation import check_choice
 
 _POLL_S = 0.1
@@ -82,6 +88,13 @@ def _approximate_curves() -> None:
     approximate_distance(mesh, _curve(mesh), targets=[_INSIDE])
 
 
+def _maps() -> None:
+    log_map(_mesh(), 0, x_axis=_INSIDE).exp([0.1, 0.1])
+    corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [1, 1, 1]]
+    faces = [[0, 1, 2], [0, 1, 3], [0, 1, 4], [1, 2, 5]]  # an edge of three: seen in the mirror
+    log_map(TriangleMesh(corners, faces), 5)
+
+
 WORKLOADS: dict[str, Callable[[], None]] = {
     "exact": _exact,
     "approximate": _approximate,
@@ -92,6 +105,7 @@ WORKLOADS: dict[str, Callable[[], None]] = {
     "borders": _borders,
     "fast-curves": _fast_curves,
     "paths": _paths,
+    "maps": _maps,
 }
 """Calls that together use all kernels, in an order that suits two processes.
 
@@ -109,8 +123,8 @@ def compile_kernels(
     ----------
     workloads
         Kinds of calls to compile for: ``"exact"``, ``"approximate"``, ``"paths"``, ``"curves"``,
-        ``"approximate-curves"``, ``"fast"``, ``"fast-curves"``, ``"isolines"`` and
-        ``"borders"``; None for all.
+        ``"approximate-curves"``, ``"fast"``, ``"fast-curves"``, ``"isolines"``, ``"borders"`` and
+        ``"maps"``; None for all.
     cancel
         Called before compilation begins and then ten times a second; compilation ends once it
         returns True. Not called where no kernel is missing.

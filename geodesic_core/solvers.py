@@ -16,10 +16,17 @@ from geodesic_core.arrays import Floats
 from geodesic_core.control import Control
 from geodesic_core.errors import NoPath
 from geodesic_core.fields.distance_field import DistanceField, solve
+from geodesic_core.fields.log_map import LogMap, log_map_of
 from geodesic_core.fields.methods import Effort, Method, promise_of, sweep_of
 from geodesic_core.fields.path import ErrorBound, GeodesicPath, joined, length_of
 from geodesic_core.fields.question import Question
 from geodesic_core.fields.sources import component_of, disconnected, each_of
+from geodesic_core.fields.straight_lines import (
+    StraightLine,
+    as_lengths,
+    directions_from,
+    lines_from,
+)
 from geodesic_core.fields.sweep_result import Retain
 from geodesic_core.fields.sweeps import ExactSweep
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
@@ -32,9 +39,10 @@ from geodesic_core.search.nearest import Nearest, find_nearest
 from geodesic_core.search.path_search import PathSearch
 from geodesic_core.search.workspace import Workspace
 from geodesic_core.tolerances import AT_LIMIT
-from geodesic_core.validation import as_limit, check_choice
+from geodesic_core.validation import as_limit, check_choice, is_index, unboxed
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
     from scipy.sparse import csr_array
 
 
@@ -541,6 +549,160 @@ def kernel_digest() -> str:
     return sources_digest()
 
 
+def log_map(
+    mesh: MeshLike | Solver,
+    source: Point,
+    *,
+    x_axis: Point | ArrayLike | None = None,
+    rescale: bool = True,
+    max_distance: float | None = None,
+    barriers: Iterable[int] = (),
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> LogMap:
+    """Return the exact logarithmic map: how far every vertex is, and in which direction.
+
+    Parameters
+    ----------
+    mesh
+        The surface: a `TriangleMesh`, anything else that `as_mesh` takes, or a `Solver`.
+    source
+        A vertex index or a `SurfacePoint`: a vertex, a point on an edge or in a face.
+    x_axis
+        From where angles are measured: a point to look at, by its shortest path; or a vector in
+        space, which is projected to the surface. None for the edge that leaves a vertex in its
+        lowest face; elsewhere for the direction from corner 0 to corner 1 of the lowest face; and
+        at a boundary for where the surface begins.
+    rescale
+        Whether `LogMap.coordinates` stretch or shrink the angles around the source to a full turn,
+        as they do on a cone that becomes a plane. At a boundary they do only where the angles are
+        more than that. Without it the coordinates show true angles.
+    max_distance
+        Limit of the sweep, mesh units; None for no limit. Vertices beyond it count as unreachable.
+    barriers
+        As in `exact_distance`.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
+
+    Returns
+    -------
+    LogMap
+        Distances, (V,) float64 in mesh units, the same as those of `exact_distance` to the bit; and
+        angles, (V,) float64, radians.
+
+    Raises
+    ------
+    InvalidPoint
+        The source is not on the mesh, or has no tangent plane: several fans of faces meet there, or
+        three faces or more at its edge. Or no path leads to the point at which the x axis looks.
+    InvalidArgument
+        The x axis has no direction, or another argument is out of its domain.
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `exact_distance`.
+
+    Notes
+    -----
+    Windows carry the direction through the sweep, which takes 5 % more time than `exact_distance`.
+    Behind the first bend of a path all vertices have its direction: see `LogMap`.
+
+    Examples
+    --------
+    >>> log_map = gc.log_map(gc.samples.plane(2), 0)
+    >>> log_map.angles[1:].round(3).tolist()
+    [0.0, 1.571, 0.785]
+    >>> gc.log_map(gc.samples.plane(2), 0, x_axis=3).coordinates[3].round(3).tolist()
+    [1.414, 0.0]
+    """
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    limit = as_limit(max_distance)
+    surface, control = _surface_of(mesh, barriers, control)
+    point = unboxed(x_axis)
+    targets = [point] if isinstance(point, SurfacePoint) or is_index(point) else []
+    start = surface.point(source, "source")
+    question = Question.of(surface, start, targets, limit, control)
+    return log_map_of(question, control, None if targets else x_axis, rescale=rescale)
+
+
+def trace(
+    mesh: MeshLike | Solver,
+    start: Points,
+    direction: ArrayLike,
+    length: ArrayLike,
+    *,
+    at_vertices: Literal["straight", "stop"] = "straight",
+    barriers: Iterable[int] = (),
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> StraightLine | list[StraightLine]:
+    """Return the straightest line from a point in a direction: the exponential map.
+
+    On faces and over edges it is straight. Through a vertex it goes with equal angles on both
+    sides, half of the sum of the angles there. It ends at the boundary, at barriers and where more
+    than two faces meet.
+
+    Parameters
+    ----------
+    mesh
+        The surface: a `TriangleMesh`, anything else that `as_mesh` takes, or a `Solver`.
+    start
+        A vertex index or a `SurfacePoint`, or N of them.
+    direction
+        An angle, radians, counter-clockwise in the frame of the start as in `log_map`; or a vector
+        in space, (3,), which is projected to the surface. For N lines also (N,) or (N, 3).
+    length
+        Mesh units, 0 or more; for N lines also (N,).
+    at_vertices
+        ``"straight"``, or ``"stop"`` for lines that end at the first vertex they meet.
+    barriers
+        As in `exact_distance`.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
+
+    Returns
+    -------
+    StraightLine or list of StraightLine
+        One for a single start, else N: paths that also tell why they end, and in which direction
+        they would go on.
+
+    Raises
+    ------
+    InvalidPoint
+        A start is not on the mesh, or has no tangent plane, as in `log_map`.
+    InvalidArgument
+        A vector has no direction on the surface, numbers of starts, directions and lengths differ,
+        or another argument is out of its domain.
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `exact_distance`.
+
+    Notes
+    -----
+    O(faces crossed). A line that meets a saddle, or passes it closely, ends far from its neighbour
+    on the other side.
+
+    Examples
+    --------
+    >>> mesh = gc.samples.plane(2)
+    >>> line = gc.trace(mesh, 0, np.pi / 4, 1.0)
+    >>> line.points[-1].round(3).tolist(), line.stopped
+    ([0.707, 0.707, 0.0], 'length')
+    >>> [line.stopped for line in gc.trace(mesh, [0, 3], [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]], 2.0)]
+    ['boundary', 'boundary']
+    """
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    check_choice("at_vertices", at_vertices, ("straight", "stop"))
+    surface, control = _surface_of(mesh, barriers, control)
+    given = list(control.watched(each_of(start, "start")))
+    starts = [surface.point(point, f"start {i}") for i, point in enumerate(control.watched(given))]
+    angles = directions_from(surface, starts, direction)
+    lengths = as_lengths(length, len(starts))
+    lines = lines_from(surface, starts, angles, lengths, at_vertices == "stop", control)
+    return lines if isinstance(start, Iterable) else lines[0]
+
+
 class Solver:
     """Solvers of one mesh that reuse memory and landmarks from call to call.
 
@@ -590,6 +752,8 @@ class Solver:
     shortest_path = shortest_path
     distance_matrix = distance_matrix
     nearest = nearest
+    log_map = log_map
+    trace = trace
 
 
 def _surface_of(

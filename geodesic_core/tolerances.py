@@ -1,6 +1,6 @@
 """Every numeric bound of the library: its name, its unit and its reason.
 
-Each is tested as a bound in ``tests/core/test_tolerances.py``.
+Each is tested as a bound beside what it bounds; ``tests/core/test_tolerances.py`` finds the tests.
 """
 
 SADDLE_EXCESS = 1e-11
@@ -321,6 +321,22 @@ TRIES = 64
 Sheets upon each other, around a sharp tip, can be gone through in more ways than time allows.
 Beyond the limit the line is lost, which is an internal error. Measured: 2.7 at most.
 """
+
+THROUGH_VERTEX = 1e-13
+"""Sine of an angle, or share of an edge, by which a straight line may miss a vertex that it meets.
+
+A line drawn to a vertex comes as near as rounding lets it. One that misses by more passes the
+vertex on a side, and behind a saddle or a tip goes on in another direction than one that meets it.
+"""
+
+NO_DIRECTION = 1e-12
+"""Share of a vector's length up to which its projection to a tangent plane has no direction.
+
+What is left of a vector along the normal is rounding.
+"""
+
+ROUNDED_TURN = 1e-9
+"""Share of a full turn by which the angles around a flat vertex may exceed it by rounding."""
 
 FORKS = 64
 """Irregular edges on one straight line at which other faces are still to be tried, at most.

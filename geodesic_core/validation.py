@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from geodesic_core.arrays import Longs
+from geodesic_core.arrays import Floats, Longs
 from geodesic_core.errors import InvalidArgument
 
 
@@ -26,6 +26,23 @@ def is_index(value: Any) -> bool:
 def unboxed(value: Any) -> Any:
     """Return the value in an array of no dimensions, and anything else as it is."""
     return value[()] if isinstance(value, np.ndarray) and value.ndim == 0 else value
+
+
+def as_vector(name: str, value: Any) -> Floats:
+    """Return a vector in space, (3,).
+
+    Raises
+    ------
+    InvalidArgument
+        It is not three finite numbers; ``name`` is the argument's.
+    """
+    try:
+        vector = np.asarray(value, np.float64)
+    except (TypeError, ValueError):
+        vector = np.empty(0)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise InvalidArgument(f"{name} is {value!r}; it must be a vector of three finite numbers")
+    return vector
 
 
 def as_limit(max_distance: float | None) -> float:

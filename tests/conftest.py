@@ -38,7 +38,8 @@ LONGEST = (
     "test_process.py",
     "test_replicas.py",
     "test_object_store.py",
-    "test_tolerances.py",
+    "test_agreement.py",
+    "test_trimming.py",
 )
 NOT_QUICK = ("service", "page", "slow")
 FULL_ONLY = ("full",)

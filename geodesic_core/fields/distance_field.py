@@ -26,6 +26,7 @@ from geodesic_core.fields.isolines import (
     resolve_chord_error,
     spaced_levels,
 )
+from geodesic_core.fields.log_map import LogMap, log_map_of
 from geodesic_core.fields.path import ErrorBound, GeodesicPath
 from geodesic_core.fields.point_query import PointQueries
 from geodesic_core.fields.question import Question
@@ -602,6 +603,62 @@ class DistanceField:
             yield drawing.lines(min(level, highest), chord_error, part) if reached else []
         if control.progress is not None:
             control.progress(1.0)
+
+    def log_map(
+        self,
+        *,
+        x_axis: Sequence[float] | None = None,
+        rescale: bool = True,
+        progress: Callable[[float], None] | None = None,
+        cancel: Callable[[], bool] | None = None,
+        deadline_s: float | None = None,
+        memory_limit: int | None = None,
+    ) -> LogMap:
+        """Return the log map of the field's source, as `log_map` does.
+
+        Parameters
+        ----------
+        x_axis
+            A vector in space, from whose projection angles are measured; None as in `log_map`.
+        rescale
+            As in `log_map`.
+        progress, cancel, deadline_s, memory_limit
+            See `Control`.
+
+        Returns
+        -------
+        LogMap
+            With the distances of the field, to the bit.
+
+        Raises
+        ------
+        InvalidArgument
+            The field is not exact, or its source is not one point without a start distance: there
+            is no one direction then. Or another argument is out of its domain.
+        InvalidPoint
+            The source has no tangent plane.
+        Cancelled, DeadlineExceeded, MemoryLimitExceeded
+            As in `Control`; the field can still be used.
+
+        Notes
+        -----
+        Runs the sweep again, whose windows then carry directions.
+
+        Examples
+        --------
+        >>> gc.exact_distance(gc.samples.plane(2), 0).log_map().angles.round(3).tolist()
+        [nan, 0.0, 1.571, 0.785]
+        """
+        control = Control(progress, cancel, deadline_s, memory_limit)
+        question = self._sweep.question
+        if self._sweep.exact is not self._sweep:
+            raise InvalidArgument("only exact fields have a log map: use exact_distance or log_map")
+        if question.has_curves or question.start_distances.tolist() != [0.0]:
+            raise InvalidArgument(
+                "a log map has one source, a point without a start distance: use log_map for each"
+            )
+        question = Question.of(self.mesh, question.sources, (), question.max_distance, control)
+        return log_map_of(question, control, x_axis, rescale=rescale)
 
     def borders(
         self,

@@ -17,8 +17,14 @@ from geodesic_core.fields.question import Question
 from geodesic_core.fields.sweep import share_of_vertices, sweep_nodes
 from geodesic_core.fields.sweep_result import Retain, all_winners, peak_bytes
 from geodesic_core.kernels.front import state
-from geodesic_core.kernels.front.bounds import Bounds, exact_bounds, merging_bounds
+from geodesic_core.kernels.front.bounds import (
+    Bounds,
+    exact_bounds,
+    merging_bounds,
+    with_directions,
+)
 from geodesic_core.kernels.front.state import Wavefront
+from geodesic_core.kernels.mesh.half_edges import SEAM
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.retained.face_windows import FaceWindows, face_windows_of
 from geodesic_core.tolerances import WIDEST_ERROR
@@ -106,7 +112,12 @@ class WholeSweep(ABC):
         mesh, nodes, limit = question.mesh, question.nodes, question.max_distance
         merges = bool(bounds.merging)
         wave = state.new_wavefront(
-            mesh.topology, nodes.sites, merges=merges, paths=merges and paths, windows=windows
+            mesh.topology,
+            nodes.sites,
+            merges=merges,
+            paths=merges and paths,
+            windows=windows,
+            directed=bool(bounds.directed),
         )
         control.check_memory(state.bytes_of(wave))
         share = share_of_vertices(question.reachable, limit)
@@ -173,6 +184,14 @@ class ExactSweep(WholeSweep):
 
     def _bounds(self) -> Bounds:
         return exact_bounds(self.question.max_distance)
+
+
+class DirectedSweep(ExactSweep):
+    """The exact sweep whose windows carry the directions in which paths leave their source."""
+
+    def _bounds(self) -> Bounds:
+        is_mirrored = bool((self.question.mesh.topology.flags & SEAM).any())
+        return with_directions(super()._bounds(), is_mirrored)
 
 
 @dataclass(frozen=True, eq=False)

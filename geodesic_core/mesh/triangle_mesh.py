@@ -24,6 +24,7 @@ from geodesic_core.mesh.degeneracies import (
 )
 from geodesic_core.mesh.report import NAMED, MeshReport, report_of, warnings_of
 from geodesic_core.mesh.surface_point import Point, SurfacePoint
+from geodesic_core.mesh.tangent_frames import TangentFrames, tangent_frames_of
 from geodesic_core.mesh.triangulation import triangulated
 from geodesic_core.mesh.validation import (
     as_faces,
@@ -603,6 +604,25 @@ class TriangleMesh:
     def report(self) -> MeshReport:
         """Counts and defects; O(V log V + F log F), computed once."""
         return report_of(self.vertices, self.faces, self.face_map, self.embedding)
+
+    def tangent_frames(self) -> TangentFrames:
+        """Return a tangent plane at each vertex, in which angles on the surface become vectors.
+
+        Returns
+        -------
+        TangentFrames
+            Computed once, O(V + F).
+
+        Examples
+        --------
+        >>> gc.samples.plane(2).tangent_frames().normals.tolist()[0]
+        [0.0, 0.0, 1.0]
+        """
+        return self._tangent_frames
+
+    @cached_property
+    def _tangent_frames(self) -> TangentFrames:
+        return tangent_frames_of(self.vertices, self.faces, self.inner_face, self.topology)
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:

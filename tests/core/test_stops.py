@@ -53,6 +53,10 @@ SWEEPS = {
     ),
     "fast": lambda m, **watch: gc.fast_distance(m, 0, 8, **watch),
 }
+SWEEPS |= {
+    "log map": lambda m, **watch: gc.log_map(m, INSIDE, x_axis=7, **watch),
+    "lines": lambda m, **watch: gc.trace(m, MANY, np.arange(10.0), 300.0, **watch),
+}
 SEARCHES = {
     "path": lambda s, **watch: s.shortest_path(0, 2000, explain=True, **watch),
     "waypoints": lambda s, **watch: s.shortest_path(0, 2000, [17, INSIDE], **watch),
@@ -122,6 +126,8 @@ def bits(found: Any) -> Any:
         near = int(np.argsort(found.distances)[50])
         counts = found.stats.as_dict() | {"seconds": 0.0}
         return [*map(bits, (found.distances, found.nearest_source, found.path_to(near))), counts]
+    if isinstance(found, gc.LogMap):
+        return [*map(bits, (found.distances, found.angles, found.bends))]
     if isinstance(found, gc.GeodesicPath):
         return answer(found)
     if isinstance(found, gc.Isoline | gc.Border | gc.Nearest):

@@ -22,6 +22,22 @@ def mesh_of(case: zoo.Case) -> gc.TriangleMesh:
     return gc.TriangleMesh(case.vertices, case.faces)
 
 
+def random_points(mesh: gc.TriangleMesh, count: int, seed: int = 0) -> list[gc.SurfacePoint]:
+    """Points inside faces, on edges and at vertices, by turns."""
+    rng = np.random.default_rng(seed)
+    points = []
+    for i, face in enumerate(rng.integers(0, len(mesh.faces), count).tolist()):
+        u, v, w = rng.dirichlet(np.ones(3)).tolist()
+        points.append(
+            [
+                gc.SurfacePoint.face(face, (u, v, w)),
+                gc.SurfacePoint.edge(face, int(rng.integers(3)), float(u)),
+                gc.SurfacePoint.vertex(int(mesh.faces[face, 0])),
+            ][i % 3]
+        )
+    return [mesh.point(point) for point in points]
+
+
 def real_mesh(name: str) -> Path:
     """The path of a real mesh; skips the test where it is absent."""
     path = MESHES / name

@@ -16,7 +16,7 @@ from geodesic_core.kernels.front.state import (
     with_larger_scratch,
 )
 from geodesic_core.kernels.front.window import Window
-from geodesic_core.kernels.mesh.half_edges import Topology
+from geodesic_core.kernels.mesh.half_edges import LENGTH, OPPOSITE, Topology
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.sweep import continuous_dijkstra
 from tests.support import zoo
@@ -80,3 +80,13 @@ def _flat(group):
     if isinstance(group, np.ndarray):
         return group.reshape(-1)
     return type(group)(*map(_flat, group)) if hasattr(group, "_fields") else group
+
+
+def flat_view(scale):
+    """A flat mesh: its view, its wavefront, and an inner half-edge of length ``scale``."""
+    points, faces = zoo.grid(3, 3)
+    topology = topology_of(zoo.Case("flat", points * scale, faces))
+    wave = started(topology, 0)
+    lengths = topology.geometry[:, LENGTH]
+    inner = (topology.links[:, OPPOSITE] >= 0) & (abs(lengths / scale - 1) < 1e-9)
+    return view_of_arrays(topology, wave), wave, int(np.flatnonzero(inner)[0])

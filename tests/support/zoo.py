@@ -37,6 +37,10 @@ def each(cases: Mapping[str, object]) -> pytest.MarkDecorator:
     return pytest.mark.parametrize("case", list(cases.values()), ids=list(cases))
 
 
+each_scale = pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+"""Run a test on meshes of very different sizes."""
+
+
 def rotation(seed: int) -> np.ndarray:
     """A random rotation."""
     q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))

@@ -17,8 +17,10 @@ from geodesic_core.kernels.front.state import (
     SETTLED,
     WINNER,
     View,
+    directed,
     merging,
 )
+from geodesic_core.kernels.front.window import Window
 from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import (
     APEX_ANGLE,
@@ -52,29 +54,22 @@ def record_winner(wave: View, node: int, via: int, sx: float, sy: float, root: i
 
 
 @inlined
-def relax_node(
-    wave: View,
-    node: int,
-    distance: float,
-    via: int,
-    sx: float,
-    sy: float,
-    root: int,
-    reference: int,
-) -> None:
+def relax_node(wave: View, node: int, distance: float, via: int, window: Window) -> None:
     """Offer a node a distance and the window that gives it; queue a vertex if it is the least.
 
     Of equal distances that of the lower source wins. Modifies the node and the heap.
     """
-    vertices, is_vertex = wave.vertices, node < wave.sizes.vertices
+    vertices, is_vertex, root = wave.vertices, node < wave.sizes.vertices, window.root
     known = vertices.distance[node]
     if not precedence(distance, vertices.source_index[root], known, vertices.source_index[node]):
         return
     if is_vertex and known == math.inf and vertices.status[node] == FAR:
         touch(wave, node)
-    record_winner(wave, node, via, sx, sy, root)
+    record_winner(wave, node, via, window.sx, window.sy, root)
     if merging(wave):
-        vertices.reference[node] = reference
+        vertices.reference[node] = window.reference
+    if directed(wave):
+        vertices.turn[node], vertices.mirrored[node] = window.turn, window.mirrored
     if distance < known:
         vertices.distance[node] = distance
         if is_vertex:

@@ -180,6 +180,11 @@ class Vertices(NamedTuple):
     it begins in the same face and crosses none; empty but in fast sweeps, for lines are straight"""
     reference: Ints
     """(N,): REFERENCE of the winning window; empty unless the sweep merges"""
+    # The following are empty unless the sweep is directed.
+    turn: Floats
+    """(N,): turn of the winning window, radians; NaN where the way crosses no edge, or bends"""
+    mirrored: Flags
+    """(N,): whether its frame is seen in the mirror"""
     # The following are ABSENT from a fast sweep.
     status: Flags
     """(V,): FAR, FRONT or SETTLED"""
@@ -296,6 +301,18 @@ def merging(wave: View) -> bool:
 
 
 @inlined
+def directed(wave: View) -> bool:
+    """Whether windows carry directions; known when it is compiled."""
+    return len(wave.bounds.directed) > 0
+
+
+@inlined
+def mirrors(wave: View) -> bool:
+    """Whether they may carry them into the mirror; known when it is compiled."""
+    return len(wave.bounds.directed) > 1
+
+
+@inlined
 def source_weight(wave: View, root: int) -> float:
     """SW of a window with this root: 0 for a parallel one, which comes from a segment, else 1."""
     if len(wave.bounds.parallel) > 0 and root >= wave.bounds.first_segment:
@@ -317,6 +334,7 @@ def new_wavefront(
     paths: bool = False,
     windows: Flags | None = None,
     pruned: bool = False,
+    directed: bool = False,
 ) -> Wavefront:
     """Allocate the state of one sweep: O(V + F), nothing reached yet.
 
@@ -337,6 +355,8 @@ def new_wavefront(
         places=NO_PLACES,
         vertices=new_vertices(nodes)._replace(
             reference=np.full(merged_nodes, -1, np.int32),
+            turn=np.empty(nodes if directed else 0),
+            mirrored=np.zeros(nodes if directed else 0, np.uint8),
             status=np.zeros(vertices, np.uint8),
             touched=np.empty(vertices, np.int32),
             heuristic=np.empty(vertices if pruned else 0),
@@ -358,6 +378,8 @@ def new_vertices(nodes: int) -> Vertices:
         source_index=np.zeros(nodes, np.int32),
         crossing=np.empty(0),
         reference=np.empty(0, np.int32),
+        turn=np.empty(0),
+        mirrored=np.empty(0, np.uint8),
         status=ABSENT,
         touched=ABSENT,
         heuristic=ABSENT,

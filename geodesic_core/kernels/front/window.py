@@ -17,6 +17,11 @@ xi             ξ                        how much it may fall short of the exact
 reference      reference list (4.3)     what was merged into it: a merge's index, or -1 - root;
                                         in an exact sweep, its last crossing of an irregular edge
                                         (a slot), or < 0: see `irregular_edges`
+turn                                    in a directed sweep, of a window lit by a source itself:
+                                        angle of the half-edge in the frame of the source, radians,
+                                        see `directions`; else NaN
+mirrored                                in a directed sweep, whether that frame is seen in the
+                                        mirror: 1 or 0
 =============  =======================  =========================================================
 
 The unfolded position replaces the two distances d0, d1, whose every use would cost a square root,
@@ -36,11 +41,12 @@ since the root tells it. What a column holds depends on the kind of sweep:
 column   exact              merging            fast
 =======  =================  =================  ==================================================
 0 to 4   B0 … SIGMA         B0 … SIGMA         B0 … SIGMA
-5        free               XI                 BUCKET: in which it is due, counted from distance 0
+5        TURN, if directed  XI                 BUCKET: in which it is due, counted from distance 0
 int 12   REFERENCE          REFERENCE          HALF_EDGE: that it is to cross; -1 - v where vertex
                                                v is to emit all around, from SIGMA
-int 13   free; DEPTH of a   free               WON: bits of the places at which it was the nearest
-         crossing
+int 13   MIRRORED, if       free               WON: bits of the places at which it was the nearest
+         directed; DEPTH
+         of a crossing
 int 14   NEXT               NEXT               NEXT
 int 15   ROOT               ROOT               ROOT
 =======  =================  =================  ==================================================
@@ -56,7 +62,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from geodesic_core.arrays import Floats
-from geodesic_core.kernels.front.state import WIDTH, View, merging, source_weight
+from geodesic_core.kernels.front.state import (
+    WIDTH,
+    View,
+    directed,
+    merging,
+    mirrors,
+    source_weight,
+)
 from geodesic_core.kernels.jit import as_ints, inlined
 from geodesic_core.kernels.planar import distance
 
@@ -66,12 +79,14 @@ B1 = 1
 SX = 2
 SY = 3
 SIGMA = 4
+TURN = 5
 XI = 5
 BUCKET = 5
 
 # Columns of a row, int32
 REFERENCE = 12
 HALF_EDGE = 12
+MIRRORED = 13
 DEPTH = 13
 WON = 13
 NEXT = 14
@@ -91,9 +106,11 @@ class Window(NamedTuple):
     root: int
     xi: float
     reference: int
+    turn: float
+    mirrored: int
 
 
-NO_WINDOW = Window(0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0, 0.0, -1)
+NO_WINDOW = Window(0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0, 0.0, -1, math.nan, 0)
 """An empty window."""
 
 
@@ -103,9 +120,13 @@ def load_window(wave: View, rows: Floats, i: int) -> Window:
     w, ints = WIDTH * i, as_ints(rows)
     root: Any = np.int64(ints[INTS * i + ROOT])  # one type, so that kernels are compiled once
     reference: Any = np.int64(ints[INTS * i + REFERENCE])
-    xi = 0.0
+    xi, turn, mirrored = 0.0, math.nan, 0
     if merging(wave):
         xi = rows[w + XI]
+    if directed(wave):
+        turn = rows[w + TURN]
+    if mirrors(wave):
+        mirrored = int(ints[INTS * i + MIRRORED])
     return Window(
         rows[w + B0],
         rows[w + B1],
@@ -116,6 +137,8 @@ def load_window(wave: View, rows: Floats, i: int) -> Window:
         root,
         xi,
         reference,
+        turn,
+        mirrored,
     )
 
 
@@ -130,6 +153,10 @@ def store_window(wave: View, rows: Floats, i: int, window: Window) -> None:
     ints[INTS * i + REFERENCE] = window.reference
     if merging(wave):
         rows[w + XI] = window.xi
+    if directed(wave):
+        rows[w + TURN] = window.turn
+    if mirrors(wave):
+        ints[INTS * i + MIRRORED] = window.mirrored
 
 
 @inlined
@@ -138,7 +165,14 @@ def emitted_window(
 ) -> Window:
     """Return a window as the pseudosource ``root`` emits it, with nothing merged into it."""
     node: Any = np.int64(root)
-    return Window(b0, b1, sx, sy, sigma, source_weight(wave, node), node, xi, -1 - node)
+    weight = source_weight(wave, node)
+    return Window(b0, b1, sx, sy, sigma, weight, node, xi, -1 - node, math.nan, 0)
+
+
+@inlined
+def ray_from(wave: View, sx: float, sy: float, root: int) -> Window:
+    """Return a straight way that crosses no edge as a window: from ``root``, at (sx, sy)."""
+    return emitted_window(wave, 0.0, 0.0, sx, sy, 0.0, root, 0.0)
 
 
 @inlined
@@ -152,8 +186,9 @@ def changed(
     xi: float,
     reference: int,
 ) -> Window:
-    """Return the window with all but its root changed."""
-    return Window(b0, b1, sx, sy, sigma, window.weight, window.root, xi, reference)
+    """Return the window with all changed but its root, and what it tells of directions."""
+    weight, root, turn = window.weight, window.root, window.turn
+    return Window(b0, b1, sx, sy, sigma, weight, root, xi, reference, turn, window.mirrored)
 
 
 @inlined
@@ -190,6 +225,14 @@ def reversed_window(window: Window, length: float) -> Window:
         sigma -= window.sx * length
     b0, b1, sx = length - window.b1, length - window.b0, length * window.weight - window.sx
     return changed(window, b0, b1, sx, window.sy, sigma, window.xi, window.reference)
+
+
+@inlined
+def turned(window: Window, turn: float, mirrored: int) -> Window:
+    """Return the window with another turn."""
+    b0, b1, sx, sy, sigma = window.b0, window.b1, window.sx, window.sy, window.sigma
+    weight, root, xi, reference = window.weight, window.root, window.xi, window.reference
+    return Window(b0, b1, sx, sy, sigma, weight, root, xi, reference, turn, mirrored)
 
 
 @inlined

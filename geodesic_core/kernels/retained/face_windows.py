@@ -101,7 +101,8 @@ def bytes_of(wave: Wavefront) -> int:
 @inlined
 def retained_window(row: Floats, root: int, weight: float) -> Window:
     """Return the window of a row of `FaceWindows`, without what was merged into it."""
-    return Window(row[B0], row[B1], row[SX], row[SY], row[SIGMA], weight, root + 0, 0.0, -1)
+    b0, b1, sx, sy, sigma = row[B0], row[B1], row[SX], row[SY], row[SIGMA]
+    return Window(b0, b1, sx, sy, sigma, weight, root + 0, 0.0, -1, math.nan, 0)
 
 
 class Reach(NamedTuple):

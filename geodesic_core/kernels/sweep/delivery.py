@@ -1,11 +1,18 @@
 """Delivery of windows and nodes: what an exact or merging sweep does with what it is offered."""
 
 from geodesic_core.kernels.front.counters import CREATED
+from geodesic_core.kernels.front.directions import seen_in_mirror
 from geodesic_core.kernels.front.pool import free_window, put_window
 from geodesic_core.kernels.front.relaxation import bound_vertex, illuminate_vertex, relax_node
 from geodesic_core.kernels.front.sites import Delivery
-from geodesic_core.kernels.front.state import View, merging, source_weight
-from geodesic_core.kernels.front.window import Window, load_window, referring_to, reversed_window
+from geodesic_core.kernels.front.state import View, merging, mirrors, source_weight
+from geodesic_core.kernels.front.window import (
+    Window,
+    load_window,
+    ray_from,
+    referring_to,
+    reversed_window,
+)
 from geodesic_core.kernels.front.window_lists import insert_sorted, queue_if_due
 from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import (
@@ -27,7 +34,7 @@ def start_at(wave: View, v: int, start: float) -> None:
     """Reach a vertex as a source, whose index it has already. Modifies the vertex and the heap."""
     if merging(wave):
         bound_vertex(wave, v, start)
-    relax_node(wave, v, start, -1, 0.0, 0.0, v, -1 - v)
+    relax_node(wave, v, start, -1, ray_from(wave, 0.0, 0.0, v))
 
 
 @kernel
@@ -45,7 +52,7 @@ def reach_straight(
         bound_vertex(wave, node, upper + reach)
         if wave.mesh.flags[node]:
             illuminate_vertex(wave, node, distance, via, sx, sy, source_weight(wave, root))
-    relax_node(wave, node, distance, via, sx, sy, root, -1 - root)
+    relax_node(wave, node, distance, via, ray_from(wave, sx, sy, root))
 
 
 @inlined
@@ -85,6 +92,8 @@ def send_across(wave: View, g: int, slot: int) -> None:
         copy = onward
         if mesh.links[ROW * h + TAIL] == mesh.links[ROW * g + TAIL]:
             copy = reversed_window(onward, mesh.geometry[ROW * g + LENGTH])
+            if mirrors(wave):
+                copy = seen_in_mirror(copy)
         insert_sorted(wave, h, put_window(wave, copy))
         wave.counters[CREATED] += 1
         queue_if_due(wave, h, mesh.links[ROW * h + TAIL], mesh.links[ROW * h + HEAD])

@@ -61,7 +61,7 @@ def reach_apex(wave: View, h: int, count: int, ax: float, ay: float) -> tuple[in
         if mesh.flags[v]:
             illuminate_apex(wave, h, count, nearest, ax, ay, best)
     surcharge = 1.0 if is_covered else 1.0 + BEND
-    relax_node(wave, v, best * surcharge, h, window.sx, window.sy, window.root, window.reference)
+    relax_node(wave, v, best * surcharge, h, window)
     return nearest, crossing, best if is_covered else math.inf
 
 

@@ -56,4 +56,4 @@ def reach_site(wave: View, h: int, count: int, k: int) -> None:
     for i in range(count):
         window = load_window(wave, wave.pool.scratch, i)
         there = way_through(window, x, y, gap)
-        relax_node(wave, node, there, h, window.sx, window.sy, window.root, window.reference)
+        relax_node(wave, node, there, h, window)

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 from geodesic_core.kernels.front.counters import CREATED
+from geodesic_core.kernels.front.directions import turned_by, turns_to_sides
 from geodesic_core.kernels.front.pool import put_window
 from geodesic_core.kernels.front.sides import Side, left_of, right_of
 from geodesic_core.kernels.front.state import FIRST, LAST, LIST, SIZE, View, merging
@@ -50,6 +51,7 @@ def spread(wave: View, h: int, count: int, nearest: int, crossing: float, least:
     left, right = left_of(wave, h), right_of(wave, h)
     ax, ay = left.cosine * left.length, left.sine * left.length
     overlap = OVERLAP * right.start
+    turns = turns_to_sides(wave, h, count)
     to_left, to_right = NO_CHAIN, NO_CHAIN
     for i in range(count):
         window = load_window(wave, wave.pool.scratch, i)
@@ -70,9 +72,10 @@ def spread(wave: View, h: int, count: int, nearest: int, crossing: float, least:
             if is_beyond and bent_distance(window, ax, ay)[0] >= least:
                 continue
         if goes_left:
-            to_left = send_over_edge(wave, to_left, left, window, covers)
+            to_left = send_over_edge(wave, to_left, left, turned_by(window, turns[0]), covers)
         if goes_right:
-            to_right = send_over_edge(wave, to_right, right, seen_from(window, ax, ay), covers)
+            window = turned_by(seen_from(window, ax, ay), turns[1])
+            to_right = send_over_edge(wave, to_right, right, window, covers)
     wave.counters[CREATED] += to_left.size + to_right.size
     deliver_left(wave, h, to_left)
     deliver_right(wave, h, to_right)

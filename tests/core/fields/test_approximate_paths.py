@@ -7,28 +7,11 @@ import geodesic_core as gc
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 from tests.support.approximation import (
-    GRANTED,
     MERGING,
     check_approximate_path,
     check_within,
-    some_sources,
 )
 from tests.support.meshes import mesh_of
-
-
-@pytest.mark.slow
-@pytest.mark.slice(2)
-@zoo.each(MERGING)
-@pytest.mark.jit
-def test_paths_where_much_is_merged(case):
-    mesh = mesh_of(case)
-    for source in some_sources(case, 1 if WITHOUT_JIT else 5):
-        exact = gc.exact_distance(mesh, source).distances
-        for error in GRANTED[1:]:
-            field = gc.approximate_distance(mesh, source, error, retain="paths")
-            for target in range(0, len(exact), len(exact) // 40 + 1):
-                if target != source:
-                    check_approximate_path(field, target, exact[target], error)
 
 
 @pytest.mark.parametrize("name", ["dented_ball", "islands", "dented_ring"])

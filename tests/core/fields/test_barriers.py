@@ -9,13 +9,8 @@ import pytest
 
 import geodesic_core as gc
 from tests.support import zoo
-from tests.support.certificates import check_path
-from tests.support.oracles import unfolding, visibility
 
 pytestmark = pytest.mark.filterwarnings("ignore::geodesic_core.errors.BlockedSource")
-
-EXACT = 1e-9
-"""Relative error allowed against an oracle."""
 
 
 def some_barriers(case: zoo.Case, share: float, seed: int = 0) -> np.ndarray:
@@ -41,58 +36,6 @@ BLOCKABLE = {
 
 
 # What distances are ------------------------------------------------------------------------------
-
-
-@pytest.mark.jit
-@pytest.mark.slow
-@pytest.mark.slice(2)
-@pytest.mark.parametrize(
-    "cells",
-    [
-        [(2, 2)],
-        [(1, 1), (1, 2), (1, 3), (4, 2), (4, 3), (4, 4)],
-        [(1, 1), (2, 2), (3, 3), (4, 2)],  # they touch at corners
-        [(x, 3) for x in range(6)],  # a wall
-        [(0, 0), (1, 0), (0, 1), (1, 1)],  # vertices of no free face
-    ],
-)
-def test_blocked_cells_of_a_grid(cells):
-    """By the visibility graph of the plane with these cells as holes."""
-    points, faces = zoo.grid(6, 6)
-    blocked = [2 * (6 * row + column) + half for column, row in cells for half in (0, 1)]
-    matrix = visibility.distance_matrix(points[:, :2], np.delete(faces, blocked, axis=0))
-    mesh = gc.TriangleMesh(points, faces)
-    for source in range(len(points)):
-        field = gc.exact_distance(mesh, source, barriers=blocked)
-        np.testing.assert_allclose(field.distances, matrix[source], rtol=EXACT, atol=0)
-
-
-@pytest.mark.slow
-@pytest.mark.slice(2)
-@pytest.mark.jit
-@pytest.mark.parametrize("seed", range(4))
-def test_blocked_triangles_of_a_grid(seed):
-    points, faces = zoo.grid(6, 5, seed=seed)
-    blocked = np.random.default_rng(seed).choice(len(faces), 4 + 6 * seed, replace=False)
-    matrix = visibility.distance_matrix(points[:, :2], np.delete(faces, blocked, axis=0))
-    mesh = gc.TriangleMesh(points, faces).with_barriers(blocked)
-    for source in range(len(points)):
-        found = gc.exact_distance(mesh, source).distances
-        np.testing.assert_allclose(found, matrix[source], rtol=EXACT, atol=0)
-
-
-@pytest.mark.slice(6)
-@pytest.mark.jit
-@pytest.mark.parametrize("share", [0.05, 0.3])
-@zoo.each(BLOCKABLE)
-def test_distances_are_those_of_the_unfolded_free_faces(case, share):
-    barriers = some_barriers(case, share, seed=1)
-    kept = free_faces(case, barriers)
-    matrix = unfolding.distance_matrix(case.vertices, case.faces[kept])
-    mesh = gc.TriangleMesh(case.vertices, case.faces)
-    for source in range(0, len(case.vertices), 5):
-        found = gc.exact_distance(mesh, source, barriers=barriers).distances
-        np.testing.assert_allclose(found, matrix[source], rtol=EXACT, atol=0)
 
 
 @pytest.mark.jit
@@ -135,46 +78,6 @@ def same_path(path: gc.GeodesicPath, other: gc.GeodesicPath, kept: np.ndarray) -
     for here, there in zip(path.locations, other.locations, strict=True):
         assert here.face_index == kept[there.face_index]
         assert (here.barycentric, here.vertex_index) == (there.barycentric, there.vertex_index)
-
-
-@pytest.mark.slice(4)
-@zoo.each(BLOCKABLE)
-def test_paths_never_cross_a_blocked_face(case):
-    mesh, _, kept = pair_of_meshes(case, some_barriers(case, 0.2, seed=3))
-    rng = np.random.default_rng(3)
-    source, *targets = (
-        mesh.point(gc.SurfacePoint.face(int(face), tuple(rng.dirichlet(np.ones(3)).tolist())))
-        for face in rng.choice(kept, 5)
-    )
-    targets += np.unique(mesh.faces)[:: 1 + len(case.vertices) // 5].tolist()
-    field = gc.exact_distance(mesh, source)
-    for target in targets:
-        distance = field.distance_at(target)
-        if math.isfinite(distance):
-            check_path(mesh, field.path_to(target), source, target, distance)
-            check_path(mesh, gc.shortest_path(mesh, source, target), source, target, distance)
-
-
-@zoo.each(BLOCKABLE)
-def test_more_barriers_never_shorten_a_distance(case):
-    mesh = gc.TriangleMesh(case.vertices, case.faces)
-    distances = gc.exact_distance(mesh, 0).distances
-    order = np.random.default_rng(4).permutation(len(case.faces))
-    for count in range(1, len(order), 1 + len(order) // 5):
-        longer = gc.exact_distance(mesh, 0, barriers=order[:count]).distances
-        assert (longer >= distances * (1 - 1e-12)).all()
-        distances = longer
-
-
-@pytest.mark.parametrize("error", [1e-4, 0.05])
-@zoo.each(BLOCKABLE)
-def test_approximate_distances_keep_to_the_bound(case, error):
-    mesh = gc.TriangleMesh(case.vertices, case.faces)
-    barriers = some_barriers(case, 0.2, seed=5)
-    exact = gc.exact_distance(mesh, 0, barriers=barriers).distances
-    found = gc.approximate_distance(mesh, 0, error, barriers=barriers).distances
-    assert (found <= exact * (1 + EXACT)).all()
-    assert (found >= exact * (1 - error)).all()
 
 
 def test_a_wall_separates():

@@ -7,7 +7,10 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.errors import InvalidArgument
-from tests.core.fields.test_points import random_points
+from geodesic_core.kernels.borders.bisectors import is_one_sided
+from geodesic_core.kernels.curves.regions import put_disc, put_side
+from geodesic_core.kernels.retained.reached import REGION, put_origin
+from geodesic_core.tolerances import PARALLEL
 from tests.support import zoo
 from tests.support.border_checks import (
     check_chords,
@@ -16,7 +19,7 @@ from tests.support.border_checks import (
     check_points,
 )
 from tests.support.isoline_checks import check_pieces, distances_from
-from tests.support.meshes import mesh_of
+from tests.support.meshes import mesh_of, random_points
 
 FINE = 1e-6
 """Chord error of what is compared with a closed form."""
@@ -247,3 +250,20 @@ def test_chord_errors_that_are_none(chord_error):
     field = gc.exact_distance(mesh_of(zoo.SMALL["octahedron"]), [0, 1])
     with pytest.raises(InvalidArgument, match="chord_error"):
         field.borders(chord_error)
+
+
+@pytest.mark.parametrize(("share", "is_told"), [(0.99, False), (1.01, True)])
+def test_parallel_is_the_angle_of_rays_that_meet_in_no_corner(share, is_told):
+    """Of two windows whose inner rays meet at such an angle; one is nearer by far."""
+    mesh = gc.TriangleMesh(zoo.SMALL["cube"].vertices, zoo.SMALL["cube"].faces)
+    windows = np.zeros((2, REGION))
+    for region, x, radius, slopes in zip(
+        windows, (0.3, 0.7), (9.0, 1.0), ((0.5, 0.0), (-share * PARALLEL, -0.5)),
+        strict=True,
+    ):  # fmt: skip
+        put_disc(region, x, -1.0, radius)
+        put_origin(region, 0, 0)
+        for end, slope in enumerate(slopes):
+            length = math.hypot(slope, 1.0)
+            put_side(region, end, -1.0 / length, slope / length, 0.0)
+    assert is_one_sided(mesh.topology.geometry, 0, *windows, 1e-12) == is_told

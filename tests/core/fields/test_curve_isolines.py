@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
+from geodesic_core.kernels.curves.regions import span_on_line
+from geodesic_core.kernels.retained.reached import REGION, put_segment_bands
+from geodesic_core.tolerances import BEHIND
 from tests.core.fields.test_curves import random_curve
 from tests.core.fields.test_isolines import FINE, check_all, total_length
 from tests.support import zoo
@@ -267,3 +270,14 @@ def test_a_curve_of_one_point_has_its_circles():
     for ours, theirs in zip(*lines, strict=True):
         np.testing.assert_array_equal(ours.points, theirs.points)
     check_points(mesh, point, level, lines[1])
+
+
+def test_behind_ends_beyond_the_segment_and_before_the_other_front():
+    far, bands = 0.25, np.zeros((2, REGION))
+    put_segment_bands(bands, 0.0, 0.0, 1.0, 0.0, far)
+    assert 1 < BEHIND < 2
+    for band, side in zip(bands, (1, -1), strict=True):
+        for y, is_inside in ((-far, 1), (0, 1), ((BEHIND - 1) * far, 0), (far, -1)):
+            point = 0.5, side * y, 1.0, 0.0
+            lo, hi = span_on_line(band, 0.0, *point, -0.1, 0.1)
+            assert lo <= hi if is_inside >= 0 else lo > hi

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 
 import geodesic_core as gc
+from geodesic_core.tolerances import ROUNDED_POSITION
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 from tests.support.certificates import LENGTH
@@ -360,3 +361,16 @@ def test_points_that_share_a_face_may_be_spelled_in_any_way():
     assert not gc.share_a_face(mesh, 1, 2)
     with pytest.raises(gc.errors.InvalidPoint, match="the end is vertex 4"):
         gc.share_a_face(mesh, 0, 4)
+
+
+@zoo.each_scale
+def test_rounded_position_is_all_that_a_path_from_a_curve_may_be_off(scale):
+    places = scale * np.array([[2.0, 0.0, 0.0], [1.0, 2.0, 2.0], [1.0, 1.0, 1.0], [0.0, 2.0, 2.0]])
+    mesh = gc.TriangleMesh(places, [[0, 2, 3], [3, 1, 2]])  # vertex 2 lies on the edge of 0 and 3
+    field, node = gc.exact_distance(mesh, gc.Curve([3, 0])), mesh.topology.inner_vertex[2]
+    assert field.path_to(2).length <= ROUNDED_POSITION * mesh.diagonal
+    field._result.distance[node] = 0.5 * ROUNDED_POSITION * mesh.diagonal
+    field.path_to(2)
+    field._result.distance[node] = 2.0 * ROUNDED_POSITION * mesh.diagonal
+    with pytest.raises(gc.errors.InternalError, match="the field says"):
+        field.path_to(2)

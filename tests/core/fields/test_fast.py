@@ -7,12 +7,21 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.fields import fast_sweep, sweep
+from geodesic_core.kernels.fast import state as fast_state
+from geodesic_core.kernels.fast.buckets import push
+from geodesic_core.kernels.fast.places import offer
+from geodesic_core.kernels.front.bounds import exact_bounds
+from geodesic_core.kernels.front.counters import CREATED, FAR_BUCKET, FRESH
+from geodesic_core.kernels.front.state import NO_SITES, view_of
+from geodesic_core.kernels.front.window import BUCKET
+from geodesic_core.kernels.jit import kernel
+from geodesic_core.tolerances import FAR_NEARER, LAST_BUCKET, MOST_AT_LARGE, MOST_CROSSINGS
 from tests.conftest import WITHOUT_JIT
-from tests.support import expected, zoo
+from tests.support import zoo
 from tests.support.approximation import MERGING, some_sources
 from tests.support.certificates import check_path
 from tests.support.meshes import mesh_of
-from tests.support.stepping import with_pool
+from tests.support.stepping import topology_of, window, with_pool
 
 EFFORTS = (1, 2) if WITHOUT_JIT else (1, 2, 4, 8)
 each_effort = pytest.mark.parametrize("effort", EFFORTS)
@@ -54,35 +63,6 @@ def check_paths(field: gc.DistanceField, exact: np.ndarray, targets) -> None:
 def reached_by(field: gc.DistanceField, count: int) -> list[int]:
     reached = np.flatnonzero(np.isfinite(field.distances) & (field.distances > 0.0))
     return np.random.default_rng(1).permutation(reached)[:count].tolist()
-
-
-@pytest.mark.slice(6)
-@zoo.each(zoo.SMALL | zoo.IRREGULAR)
-@pytest.mark.jit
-def test_never_below_the_oracle_and_paths_are_as_short(case):
-    matrix, mesh = expected.matrix(case), mesh_of(case)
-    for source in some_sources(case, 6):
-        for effort in EFFORTS:
-            field = gc.fast_distance(mesh, source, effort)
-            check_never_below(field.distances, matrix[source])
-            reached = np.isfinite(matrix[source])
-            np.testing.assert_array_equal(field.nearest_source, np.where(reached, 0, -1))
-            check_paths(field, matrix[source], reached_by(field, 8))
-
-
-@pytest.mark.jit
-@pytest.mark.slice(4)
-@zoo.each(zoo.KNOWN)
-def test_never_below_closed_forms(case):
-    """Slivers among them."""
-    mesh = mesh_of(case)
-    for source in some_sources(case, 3):
-        exact = case.distances(source)
-        for effort in EFFORTS:
-            field = gc.fast_distance(mesh, source, effort)
-            rounding = 1e-9 * mesh.diagonal
-            assert (field.distances >= exact * (1 - 1e-9) - rounding).all()
-            check_paths(field, exact, reached_by(field, 8))
 
 
 @pytest.mark.jit
@@ -239,3 +219,60 @@ def test_the_error_is_estimated_by_effort():
     bounds = [gc.fast_distance(mesh, 0, effort).error_bound for effort in (1, 2, 4, 8)]
     assert {(bound.type, bound.kind) for bound in bounds} == {("relative", "estimated")}
     assert [bound.value for bound in bounds] == sorted({b.value for b in bounds}, reverse=True)
+
+
+@pytest.mark.jit
+@pytest.mark.parametrize(("most", "ends"), [(0, False), (12, True), (MOST_CROSSINGS, True)])
+def test_most_crossings_are_more_than_a_fast_sweep_needs(monkeypatch, most, ends):
+    mesh = gc.samples.sphere(20480)
+    monkeypatch.setattr(fast_sweep, "MOST_CROSSINGS", most)
+    if ends:
+        assert np.isfinite(gc.fast_distance(mesh, 0, effort=8).distances).all()
+    else:
+        with pytest.raises(gc.errors.InternalError, match="exact_distance"):
+            gc.fast_distance(mesh, 0, effort=8)
+
+
+@kernel
+def offer_to(topology, front, bounds, h, length, offered):
+    """Offer a window to a half-edge that nothing has left by."""
+    offer(view_of(topology, front, bounds), h, -1, length, offered)
+
+
+def waiting(offers: int, sigma: float) -> int:
+    """How many of some equal windows wait; they win no place, and all else known is 10.2 there."""
+    square = gc.samples.plane(2)
+    topology = topology_of(zoo.Case("square", square.vertices, square.faces))
+    front = fast_state.new_wavefront(topology, NO_SITES, 1, 1.0, 0)
+    front.vertices.distance[:], front.places.values[:] = 10.0, 10.0
+    bounds = fast_state.fast_bounds(exact_bounds(math.inf))
+    for _ in range(offers):
+        offer_to(topology, front, bounds, 0, 1.0, window(0.1, 0.3, 0.2, 0.0, sigma))
+    return int(front.counters[CREATED])
+
+
+@kernel
+def push_to(topology, front, bounds, h, pushed, key):
+    """Have a window wait to cross a half-edge."""
+    push(view_of(topology, front, bounds), h, pushed, 1, key)
+
+
+def test_last_bucket_is_that_of_all_windows_beyond():
+    topology = topology_of(zoo.SMALL["crags"])
+    front = fast_state.new_wavefront(topology, NO_SITES, 1, 1.0, 0)
+    bounds = fast_state.fast_bounds(exact_bounds(math.inf))
+    keys = np.array([0.5, 1.0, 2.0, 1e30]) * LAST_BUCKET
+    for key in keys:
+        push_to(topology, front, bounds, 0, window(0.0, 1.0, 0.0, 0.0, key), key)
+    due = front.pool.windows[: front.counters[FRESH], BUCKET]
+    np.testing.assert_array_equal(due, np.minimum(keys, LAST_BUCKET))
+    assert front.counters[FAR_BUCKET] == 0.5 * LAST_BUCKET
+
+
+@pytest.mark.parametrize(("share", "goes_on"), [(1.001, True), (0.999, False)])
+def test_far_nearer_lets_a_window_go_on_without_a_place(share, goes_on):
+    assert waiting(1, 10.2 / (FAR_NEARER * share)) == goes_on
+
+
+def test_most_at_large_bounds_the_windows_without_a_place():
+    assert waiting(MOST_AT_LARGE + 3, 9.9) == MOST_AT_LARGE

@@ -5,9 +5,8 @@ import pytest
 
 import geodesic_core as gc
 from tests.conftest import WITHOUT_JIT
-from tests.core.fields.test_points import random_points
 from tests.support import zoo
-from tests.support.meshes import mesh_of
+from tests.support.meshes import mesh_of, random_points
 from tests.support.oracles.graph import edge_lengths
 
 DIRECTION = 1e-5

@@ -7,9 +7,12 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.errors import InvalidArgument
-from geodesic_core.tolerances import CROSSING, LEVEL, PIECE
+from geodesic_core.kernels.curves.regions import RADIUS, put_disc
+from geodesic_core.kernels.isolines.arcs import outer_arcs
+from geodesic_core.kernels.isolines.cuts import united
+from geodesic_core.kernels.retained.reached import REGION
+from geodesic_core.tolerances import CROSSING, CUT_OFF, FINEST_CHORD, LEVEL, PIECE
 from tests.conftest import WITHOUT_JIT
-from tests.core.fields.test_points import random_points
 from tests.support import zoo
 from tests.support.isoline_checks import (
     check_crossings,
@@ -20,7 +23,7 @@ from tests.support.isoline_checks import (
     distances_from,
     some_levels,
 )
-from tests.support.meshes import mesh_of, named_mesh
+from tests.support.meshes import mesh_of, named_mesh, random_points
 
 FINE = 1e-6
 """Chord error of what is compared with a closed form."""
@@ -80,7 +83,7 @@ LEVELS = pytest.mark.parametrize("share", [-3.0, -0.5, 0.0, 0.5, 3.0])
 
 
 @LEVELS
-@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+@zoo.each_scale
 def test_lines_along_edges_are_one_and_whole(share, scale):
     """Of a curve along a column of edges, lines run along others, or a hair beside them."""
     points, faces = zoo.grid(6, 3)
@@ -419,3 +422,53 @@ def test_nothing_is_shared_between_calls():
             np.testing.assert_array_equal(line.points, other.points)
             line.points[:] = 0.0
             assert other.points.any()
+
+
+@pytest.mark.slow
+@zoo.each_scale
+@pytest.mark.parametrize("share", [-3.0, -0.5, 0.5, 3.0])
+def test_level_is_how_near_two_circles_count_as_one(scale, share):
+    """Of circles that are one the first counts; of others, around one point, the larger."""
+    mesh = gc.TriangleMesh(scale * zoo.SMALL["cube"].vertices, zoo.SMALL["cube"].faces)
+    discs, level = np.zeros((2, REGION)), 0.1 * scale
+    for disc, radius in zip(discs, (level, level * (1.0 + share * LEVEL)), strict=True):
+        put_disc(disc, 0.3 * scale, 0.01 * scale, radius)
+    arcs = outer_arcs(mesh.topology, 0, discs, level, 0.0)
+    assert set(arcs[:, RADIUS]) == {discs[1 if share > 1.0 else 0, RADIUS]}
+
+
+@pytest.mark.parametrize(("share", "left"), [(0.9, 1), (1.1, 2)])
+def test_crossing_is_the_gap_between_stretches_that_are_one(share, left):
+    gap = share * CROSSING
+    assert united(np.array([[0.5 + gap, 0.75], [0.25, 0.5]]), CROSSING) == left
+
+
+@pytest.mark.parametrize(("radius", "lines"), [(0.1, 0), (3.0, 1)])
+def test_piece_is_the_length_of_what_is_left_out(radius, lines):
+    mesh = gc.TriangleMesh(zoo.SMALL["cube"].vertices, zoo.SMALL["cube"].faces)
+    source = gc.Source(gc.SurfacePoint.face(0, (0.3, 0.3, 0.4)), 1.0)
+    field = gc.exact_distance(mesh, source)
+    assert len(field.isolines([1.0 + radius * PIECE])[0]) == lines
+
+
+def test_cut_off_is_how_far_lines_stay_below_the_limit():
+    """On a square, from both of its lower corners."""
+    limit, mesh = 0.8, gc.samples.plane(200)
+    left, right = mesh.vertices[[0, 10]]
+    field = gc.exact_distance(mesh, [0, 10], max_distance=limit)
+    (line,), (border,) = field.isolines([limit])[0], field.borders()
+    for points in (line.points, border.points[np.argmax(border.points[:, 1])][None]):
+        ways = np.minimum(*(np.linalg.norm(points - corner, axis=1) for corner in (left, right)))
+        np.testing.assert_allclose(1.0 - ways / limit, CUT_OFF, rtol=1e-3)
+
+
+@zoo.each_scale
+@pytest.mark.parametrize(("share", "is_taken"), [(0.99, False), (1.01, True)])
+def test_finest_chord_is_the_least_chord_error(scale, share, is_taken):
+    mesh = gc.TriangleMesh(scale * zoo.SMALL["cube"].vertices, zoo.SMALL["cube"].faces)
+    chord_error = share * FINEST_CHORD * mesh.diagonal
+    if is_taken:
+        assert gc.resolve_chord_error(mesh, chord_error) == chord_error
+    else:
+        with pytest.raises(gc.errors.InvalidArgument, match="chord_error"):
+            gc.resolve_chord_error(mesh, chord_error)

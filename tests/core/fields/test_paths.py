@@ -5,60 +5,16 @@ import pytest
 
 import geodesic_core as gc
 from tests.conftest import WITHOUT_JIT
-from tests.support import expected, zoo
+from tests.support import zoo
 from tests.support.approximation import (
-    GRANTED,
     MERGING,
     check_approximate_path,
     each_error,
     exact_or_not,
     solve,
-    some_sources,
 )
 from tests.support.certificates import check_path
 from tests.support.meshes import mesh_of
-
-
-def check_paths(mesh, source, exact, error, at_most=10**9):
-    """Check the paths from a source to all vertices, or about ``at_most``, evenly spread."""
-    field = solve(mesh, source, error, retain="paths")
-    reached = np.flatnonzero(np.isfinite(exact))
-    for target in reached[:: len(reached) // at_most + 1].tolist():
-        if target != source:
-            check_approximate_path(field, target, exact[target], error)
-
-
-@pytest.mark.slice(4)
-@zoo.each(zoo.SMALL | zoo.IRREGULAR)
-@pytest.mark.jit
-def test_paths_on_small_meshes(case):
-    mesh = mesh_of(case)
-    for source in some_sources(case, 1 if WITHOUT_JIT else 4):
-        exact = expected.matrix(case)[source]
-        check_paths(mesh, source, exact, 0)
-        check_paths(mesh, source, exact, 1e-2, at_most=30)
-
-
-@pytest.mark.slow
-@pytest.mark.slice(3)
-@pytest.mark.jit
-@zoo.each(zoo.KNOWN)
-def test_paths_on_larger_meshes_and_slivers(case):
-    mesh, source = mesh_of(case), len(case.vertices) // 3
-    exact = case.distances(source)
-    check_paths(mesh, source, exact, 0, at_most=300)
-    check_paths(mesh, source, exact, 1e-3, at_most=60)
-
-
-@pytest.mark.full
-@pytest.mark.jit
-@zoo.each(zoo.KNOWN | MERGING)
-def test_paths_from_many_sources(case):
-    mesh = mesh_of(case)
-    for source in some_sources(case, 20):
-        exact = gc.exact_distance(mesh, source).distances
-        for error in GRANTED:
-            check_paths(mesh, source, exact, error, at_most=300 if error == 0 else 100)
 
 
 def test_a_path_through_saddles_has_its_vertices_as_points():

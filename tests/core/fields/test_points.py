@@ -1,6 +1,5 @@
 """Points anywhere on the surface, as sources and as targets."""
 
-import itertools
 import math
 
 import numpy as np
@@ -8,109 +7,23 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.fields import point_query
-from tests.conftest import WITHOUT_JIT
+from geodesic_core.tolerances import (
+    EDGE_STEPS,
+    ROUNDED_COORDINATE,
+    ROUNDED_SUM,
+    SNAP,
+    WEIGHT,
+    WEIGHT_ERROR,
+)
 from tests.support import zoo
 from tests.support.certificates import check_path
-from tests.support.meshes import mesh_of
-from tests.support.oracles import unfolding
-from tests.support.splitting import split_at
+from tests.support.meshes import mesh_of, random_points
 
 EXACT = 1e-9
 """Relative error allowed against an oracle."""
 
 SAME = 1e-11
 """Relative difference allowed between two ways to one exact distance."""
-
-
-def random_points(mesh: gc.TriangleMesh, count: int, seed: int = 0) -> list[gc.SurfacePoint]:
-    """Points inside faces, on edges and at vertices, by turns."""
-    rng = np.random.default_rng(seed)
-    points = []
-    for i, face in enumerate(rng.integers(0, len(mesh.faces), count).tolist()):
-        u, v, w = rng.dirichlet(np.ones(3)).tolist()
-        points.append(
-            [
-                gc.SurfacePoint.face(face, (u, v, w)),
-                gc.SurfacePoint.edge(face, int(rng.integers(3)), float(u)),
-                gc.SurfacePoint.vertex(int(mesh.faces[face, 0])),
-            ][i % 3]
-        )
-    return [mesh.point(point) for point in points]
-
-
-# Where many sheets lie near each other the oracle has too many ways to look at.
-ORACLE = zoo.SMALL | {
-    name: zoo.IRREGULAR[name]
-    for name in ("three_faces_at_an_edge", "flipped_face", "moebius", "book_of_3")
-}
-
-
-@pytest.mark.slice(6)
-@pytest.mark.jit
-@zoo.each(ORACLE)
-def test_distances_are_those_of_a_mesh_with_vertices_there(case):
-    """By the unfolding oracle, which knows vertices only."""
-    mesh = mesh_of(case)
-    points = random_points(mesh, 6, seed=1)
-    vertices, faces, at = split_at(mesh, points)
-    matrix = unfolding.distance_matrix(vertices, faces)
-    for source, v in zip(points, at, strict=True):
-        field = gc.exact_distance(mesh, source, targets=points)
-        np.testing.assert_allclose(
-            field.distances, matrix[v, : len(mesh.vertices)], rtol=EXACT, atol=1e-12
-        )
-        found = [field.distance_at(target) for target in points]
-        np.testing.assert_allclose(found, matrix[v, at], rtol=EXACT, atol=1e-12)
-
-
-@pytest.mark.jit
-@pytest.mark.slow
-@pytest.mark.slice(2)
-@zoo.each(zoo.SMALL | zoo.IRREGULAR)
-def test_all_ways_to_a_distance_agree(case):
-    """Swept forth and back, on the way and afterwards, between two points, as a path."""
-    mesh = mesh_of(case)
-    points = random_points(mesh, 9, seed=2)
-    solver = gc.Solver(mesh)
-    fields = [gc.exact_distance(mesh, source, targets=points) for source in points]
-    for i, j in itertools.product(range(len(points)), repeat=2):
-        source, target = points[i], points[j]
-        distance = fields[i].distance_at(target)
-        assert fields[j].distance_at(source) == pytest.approx(distance, rel=SAME, abs=1e-14)
-        later = gc.exact_distance(mesh, source)
-        assert later.distance_at(target) == pytest.approx(distance, rel=SAME, abs=1e-14)
-        if math.isinf(distance):
-            with pytest.raises(gc.errors.NoPath) as caught:
-                solver.shortest_path(source, target)
-            assert caught.value.reason == "disconnected"
-            continue
-        for path in (
-            fields[i].path_to(target),
-            later.path_to(target),
-            solver.shortest_path(source, target),
-        ):
-            check_path(mesh, path, source, target, distance)
-
-
-@pytest.mark.slice(5)
-@zoo.each(zoo.SMALL | zoo.IRREGULAR)
-def test_approximate_distances_of_points_keep_to_the_bound(case):
-    mesh = mesh_of(case)
-    points = random_points(mesh, 3 if WITHOUT_JIT else 6, seed=3)
-    for source in points:
-        exact = gc.exact_distance(mesh, source, targets=points)
-        for error in (1e-3, 0.05):
-            field = gc.approximate_distance(mesh, source, error, targets=points, retain="paths")
-            assert (field.distances <= exact.distances * (1 + 1e-9)).all()
-            assert (field.distances >= exact.distances * (1 - error)).all()
-            for target in points:
-                distance = exact.distance_at(target)
-                assert field.distance_at(target) <= distance * (1 + 1e-9)
-                assert field.distance_at(target) >= distance * (1 - error)
-                if math.isfinite(distance):
-                    path = field.path_to(target)
-                    assert path.length >= distance * (1 - 1e-9)
-                    assert path.length <= distance * (1 + error)
 
 
 @pytest.mark.parametrize("t", [0.3, 1 / 3, 0.5, 1e-5, 0.7])
@@ -253,46 +166,6 @@ def test_two_points_of_one_face_have_the_segment_between_them():
     assert path.faces.tolist() == [3]
 
 
-def test_several_sources_and_start_distances():
-    mesh = mesh_of(zoo.SMALL["octahedron"])
-    points = random_points(mesh, 6, seed=5)
-    sources = [gc.Source(point, 0.1 * i) for i, point in enumerate(points)]
-    field = gc.exact_distance(mesh, sources, targets=points)
-    single = [gc.exact_distance(mesh, point, targets=points) for point in points]
-    least = np.min([f.distances + 0.1 * i for i, f in enumerate(single)], axis=0)
-    np.testing.assert_allclose(field.distances, least, rtol=SAME)
-    nearest = np.argmin([f.distances + 0.1 * i for i, f in enumerate(single)], axis=0)
-    np.testing.assert_array_equal(field.nearest_source, nearest)
-    plain = gc.exact_distance(mesh, sources)
-    for target in points:
-        expected = min(f.distance_at(target) + 0.1 * i for i, f in enumerate(single))
-        assert field.distance_at(target) == pytest.approx(expected, rel=SAME, abs=1e-15)
-        assert plain.distance_at(target) == pytest.approx(expected, rel=SAME, abs=1e-15)
-
-
-@pytest.mark.jit
-@zoo.each(zoo.KNOWN)
-def test_max_distance_counts_for_points_as_for_vertices(case):
-    mesh = mesh_of(case)
-    source, *targets = random_points(mesh, 12, seed=6)
-    full = gc.exact_distance(mesh, source, targets=targets)
-    known = sorted(full.distance_at(target) for target in targets)
-    limit = 0.5 * (known[4] + known[5])
-    near = gc.exact_distance(mesh, source, limit)
-    told = gc.exact_distance(mesh, source, limit, targets)
-    for target in targets:
-        distance = full.distance_at(target)
-        if distance > limit:
-            assert near.distance_at(target) == told.distance_at(target) == math.inf
-            for field in (near, told):
-                with pytest.raises(gc.errors.NoPath) as caught:
-                    field.path_to(target)
-                assert caught.value.reason in ("beyond_max_distance", "disconnected")
-        else:
-            assert told.distance_at(target) == pytest.approx(distance, rel=SAME, abs=1e-14)
-            assert near.distance_at(target) == pytest.approx(distance, rel=EXACT, abs=1e-14)
-
-
 @zoo.each(zoo.SMALL)
 def test_points_of_an_edge_by_its_ends(case):
     mesh = mesh_of(case)
@@ -325,33 +198,6 @@ def test_edges_and_shares_that_there_are_not(ends, t, message):
 
     with pytest.raises(gc.errors.InvalidPoint, match=message):
         mesh.point_on_edge(*ends, t)
-
-
-@pytest.mark.slice(8)
-@zoo.each(zoo.SMALL)
-@pytest.mark.parametrize("approximate", [False, True])
-@pytest.mark.jit
-def test_the_nearest_source_of_points(case, approximate):
-    """By a sweep from each source alone; where two are as near, either will do."""
-    mesh = mesh_of(case)
-    points = random_points(mesh, 4 if WITHOUT_JIT else 8, seed=7)
-    sources = [gc.Source(point, 0.1 * i * mesh.diagonal) for i, point in enumerate(points[:3])]
-    alone = [
-        [source.start_distance + gc.exact_distance(mesh, source.point).distance_at(point)
-         for source in sources]
-        for point in points
-    ]  # fmt: skip
-    solve = gc.approximate_distance if approximate else gc.exact_distance
-    for targets in ((), points):
-        field = solve(mesh, sources, targets=targets)
-        for point, distances in zip(points, alone, strict=True):
-            nearest = field.nearest_source_at(point)
-            if math.isinf(min(distances)):
-                assert nearest == -1
-            else:
-                assert distances[nearest] <= min(distances) * (1 + 3e-3) + 1e-14
-        nearest = [field.nearest_source_at(v) for v in range(len(mesh.vertices))]
-        np.testing.assert_array_equal(nearest, field.nearest_source)
 
 
 @pytest.mark.parametrize("position", [(1e51, 0, 0), (0, -1e160, 0), (0, 0, 1.7e308)])
@@ -394,3 +240,75 @@ def test_approximate_paths_take_the_right_face_beyond_an_irregular_edge(case, se
             distance = exact.distance_at(target)
             length = field.path_to(target).length
             assert distance * (1 - 1e-9) - 1e-15 <= length <= distance * (1 + 1e-3) + 1e-15
+
+
+@pytest.fixture
+def cube() -> gc.TriangleMesh:
+    case = zoo.SMALL["cube"]
+    return gc.TriangleMesh(case.vertices, case.faces)
+
+
+def carrier(mesh, point) -> int:
+    """Of how many corners a point is made."""
+    return sum(weight > 0 for weight in mesh.point(point).barycentric)
+
+
+@pytest.mark.parametrize(("share", "corners"), [(0.9, 2), (1.1, 3)])
+def test_weight_divides_what_is_on_an_edge_from_what_is_inside(cube, share, corners):
+    small = share * WEIGHT
+    point = gc.SurfacePoint.face(1, (0.5 - small, small, 0.5))
+    assert carrier(cube, point) == corners
+
+
+@pytest.mark.parametrize(("share", "is_taken"), [(0.9, True), (1.1, False)])
+def test_weight_error_is_how_far_weights_may_be_off(cube, share, is_taken):
+    off = share * WEIGHT_ERROR
+    for weights in ((0.5, 0.5 + off, -off), (0.5, 0.3, 0.2 + off), (0.5, 0.3, 0.2 - off)):
+        if is_taken:
+            cube.point(gc.SurfacePoint.face(1, weights))
+        else:
+            with pytest.raises(gc.errors.InvalidPoint, match="weights"):
+                cube.point(gc.SurfacePoint.face(1, weights))
+
+
+def test_edge_steps_tell_points_on_an_edge_apart(cube):
+    step = 1 / EDGE_STEPS
+    at = lambda t: cube.point(gc.SurfacePoint.edge(0, 0, t))  # noqa: E731
+    assert at(0.25) == at(0.25 + 0.4 * step) == at(0.25 - 0.4 * step)
+    assert at(0.25) != at(0.25 + 0.6 * step)
+    assert at(0.4 * step) == at(0.0)
+    assert at(0.4 * step).vertex_index is not None
+    assert at(1.2 * step).vertex_index is None
+
+
+@zoo.each_scale
+@pytest.mark.parametrize(("share", "snaps"), [(0.5, True), (3.0, False)])
+def test_snap_is_how_near_a_position_must_be(scale, share, snaps):
+    case = zoo.SMALL["cube"]
+    mesh = gc.TriangleMesh(scale * case.vertices, case.faces)
+    a, b, c = mesh.vertices[mesh.faces[0]]
+    away = share * SNAP * mesh.diagonal
+    inward = away * (c - 0.5 * (a + b)) / np.linalg.norm(c - 0.5 * (a + b))
+    assert carrier(mesh, mesh.locate(0.6 * a + 0.4 * b + inward)) == (2 if snaps else 3)
+    along = away * (b - a) / np.linalg.norm(b - a)
+    assert carrier(mesh, mesh.locate(a + along)) == (1 if snaps else 2)
+
+
+@zoo.each_scale
+@pytest.mark.parametrize(("share", "snaps"), [(0.5, True), (3.0, False)])
+def test_rounded_coordinate_is_how_near_a_position_far_from_zero_must_be(scale, share, snaps):
+    mesh = gc.TriangleMesh(scale * (np.eye(3)[[2, 0, 1]] + 5e6), [[0, 1, 2]])
+    a, b, c = mesh.vertices
+    away = share * ROUNDED_COORDINATE * np.abs(mesh.vertices).max()
+    inward = away * (c - 0.5 * (a + b)) / np.linalg.norm(c - 0.5 * (a + b))
+    assert carrier(mesh, mesh.locate(0.5 * a + 0.5 * b + inward)) == (2 if snaps else 3)
+    along = away * (b - a) / np.linalg.norm(b - a)
+    assert carrier(mesh, mesh.locate(a + along)) == (1 if snaps else 2)
+
+
+def test_rounded_sum_is_how_far_weights_stay_as_they_are(cube):
+    for excess, stays in ((0.9, True), (-0.9, True), (5.0, False), (-5.0, False)):
+        weights = (0.25, 0.25, 0.5 + excess * ROUNDED_SUM)
+        point = cube.point(gc.SurfacePoint.face(0, weights))
+        assert (point.barycentric == weights) == stays
+        assert cube.point(point) == point

@@ -1,90 +1,20 @@
 """Points of an exact field by the windows that it kept: the same as by a search, or on the way."""
 
 import itertools
-import math
 
 import numpy as np
 import pytest
 
 import geodesic_core as gc
 from geodesic_core.control import Control
-from geodesic_core.errors import MemoryLimitExceeded, NoPath
+from geodesic_core.errors import MemoryLimitExceeded
 from geodesic_core.fields import point_query
-from tests.conftest import WITHOUT_JIT
-from tests.core.fields.test_points import SAME, random_points
-from tests.support import zoo
-from tests.support.certificates import check_path
-from tests.support.meshes import mesh_of
+from tests.core.fields.test_points import SAME
+from tests.support.meshes import random_points
 
 
 def kept_field(mesh, sources, **options):
     return gc.exact_distance(mesh, sources, retain="windows", **options)
-
-
-@pytest.mark.slice(4)
-@zoo.each(zoo.SMALL | zoo.IRREGULAR)
-def test_windows_find_what_a_sweep_to_the_point_finds(case):
-    mesh = mesh_of(case)
-    points = random_points(mesh, 4 if WITHOUT_JIT else 12, seed=21)
-    for source in points[:6]:
-        kept, told = kept_field(mesh, source), gc.exact_distance(mesh, source, targets=points)
-        np.testing.assert_array_equal(kept.distances, told.distances)
-        for target in points:
-            distance = told.distance_at(target)
-            assert kept.distance_at(target) == pytest.approx(distance, rel=SAME, abs=1e-14)
-            assert kept.nearest_source_at(target) == told.nearest_source_at(target)
-            if math.isinf(distance):
-                with pytest.raises(NoPath, match="component"):
-                    kept.path_to(target)
-            else:
-                check_path(mesh, kept.path_to(target), source, target, distance)
-
-
-@pytest.mark.slice(3)
-@pytest.mark.jit
-@zoo.each(zoo.KNOWN)
-def test_windows_on_meshes_of_closed_forms(case):
-    mesh = mesh_of(case)
-    source, *targets = random_points(mesh, 30, seed=22)
-    kept, told = kept_field(mesh, source), gc.exact_distance(mesh, source, targets=targets)
-    for target in targets:
-        distance = told.distance_at(target)
-        assert kept.distance_at(target) == pytest.approx(distance, rel=SAME, abs=1e-14)
-        check_path(mesh, kept.path_to(target), source, target, distance)
-
-
-@zoo.each(zoo.SMALL)
-def test_several_sources_with_start_distances(case):
-    mesh = mesh_of(case)
-    points = random_points(mesh, 4 if WITHOUT_JIT else 9, seed=23)
-    sources = [gc.Source(point, 0.1 * i * mesh.diagonal) for i, point in enumerate(points[:3])]
-    kept, plain = kept_field(mesh, sources), gc.exact_distance(mesh, sources)
-    for point in points:
-        assert kept.distance_at(point) == pytest.approx(plain.distance_at(point), rel=SAME)
-        nearest, other = kept.nearest_source_at(point), plain.nearest_source_at(point)
-        if nearest != other:  # two that are as near
-            alone = [gc.exact_distance(mesh, s.point).distance_at(point) for s in sources]
-            ways = [s.start_distance + way for s, way in zip(sources, alone, strict=True)]
-            assert ways[nearest] == pytest.approx(ways[other], rel=SAME)
-
-
-@zoo.each(zoo.SMALL)
-def test_windows_keep_to_max_distance(case):
-    mesh = mesh_of(case)
-    source, *targets = random_points(mesh, 4 if WITHOUT_JIT else 10, seed=24)
-    full = gc.exact_distance(mesh, source, targets=targets)
-    known = sorted(full.distance_at(target) for target in targets)
-    limit = 0.5 * (known[1] + known[2])
-    near = kept_field(mesh, source, max_distance=limit)
-    for target in targets:
-        distance = full.distance_at(target)
-        if distance > limit:
-            assert near.distance_at(target) == math.inf
-            assert near.nearest_source_at(target) == -1
-            with pytest.raises(NoPath):
-                near.path_to(target)
-        else:
-            assert near.distance_at(target) == pytest.approx(distance, rel=SAME, abs=1e-14)
 
 
 @pytest.mark.jit

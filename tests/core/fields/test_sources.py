@@ -1,15 +1,18 @@
 """Several sources, start distances, ties, and the limit of distance."""
 
+import math
+
 import numpy as np
 import pytest
 
 import geodesic_core as gc
+from geodesic_core.kernels.front.relaxation import precedence
+from geodesic_core.tolerances import TIE
 from tests.conftest import WITHOUT_JIT
 from tests.support import expected, zoo
 from tests.support.approximation import (
     GRANTED,
     MERGING,
-    ROUNDING,
     check_limited,
     check_within,
     each_error,
@@ -17,34 +20,7 @@ from tests.support.approximation import (
 )
 from tests.support.meshes import mesh_of
 
-TIE = 1e-12
 SMALL_AND_MERGING = zoo.SMALL | MERGING
-
-
-@pytest.mark.slice(len(zoo.SMALL))
-@zoo.each(zoo.SMALL)
-@pytest.mark.jit
-def test_several_sources_are_the_least_of_each(case):
-    mesh, matrix = mesh_of(case), expected.matrix(case)
-    rng = np.random.default_rng(len(case.faces))
-    for count in (2, 3, 5):
-        points = rng.integers(0, len(case.vertices), count)
-        starts = rng.uniform(0, 1, count) * rng.integers(0, 2, count)
-        sources = [gc.Source(int(s), float(t)) for s, t in zip(points, starts, strict=True)]
-        each = matrix[points] + starts[:, None]
-        least = each.min(axis=0)
-        reached = np.isfinite(least)
-        for error in GRANTED:
-            field = solve(mesh, sources, error)
-            check_within(field.distances, least, error)
-            nearest = field.nearest_source[reached]
-            assert (field.nearest_source[~reached] == -1).all()
-            # The named source is the nearest, or its lead is less than may be told.
-            named = each[nearest, np.flatnonzero(reached)]
-            assert (named <= least[reached] * (1 + ROUNDING) / (1 - error)).all()
-            if error == 0:  # no lower one attains the least distance as well
-                ties = each <= least * (1 + TIE)
-                np.testing.assert_array_equal(nearest, ties.argmax(axis=0)[reached])
 
 
 @each_error
@@ -146,3 +122,27 @@ def test_max_distance_saves_work(error):
     mesh = gc.TriangleMesh(*zoo.icosphere(4))
     near = solve(mesh, 0, error, max_distance=0.2).stats
     assert near.windows_created < 0.05 * solve(mesh, 0, error).stats.windows_created
+
+
+@zoo.each_scale
+def test_tie_is_the_most_that_a_lower_source_may_be_farther(scale):
+    for share, lower_wins in ((0.5, True), (-0.5, True), (2.0, False), (-2.0, True)):
+        offered = scale * (1 + share * TIE)
+        assert precedence(offered, 0, scale, 1) == lower_wins
+        assert precedence(scale, 1, offered, 0) != lower_wins
+    assert not precedence(scale, 0, scale, 0)
+    assert precedence(scale, 7, math.inf, 0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_tie_covers_the_rounding_of_symmetric_meshes(seed):
+    """Turned at random, a grid is symmetric but for rounding: its diagonal goes to source 0."""
+    case = zoo.Case("grid", *zoo.grid(8, 8)).moved(zoo.rotation(seed), (3.0, 1.0, -2.0))
+    mesh = gc.TriangleMesh(case.vertices, case.faces)
+    corners = [8, 72]
+    field, mirrored = (gc.exact_distance(mesh, ends) for ends in (corners, corners[::-1]))
+    diagonal = np.arange(0, 81, 10)
+    assert (field.nearest_source[diagonal] == 0).all()
+    assert (mirrored.nearest_source[diagonal] == 0).all()
+    late = gc.exact_distance(mesh, [gc.Source(8, 8 * 10 * TIE), gc.Source(72)])
+    assert (late.nearest_source[diagonal] == 1).all()

@@ -107,3 +107,12 @@ def test_both_ends_of_an_open_fan_are_neighbours():
     sides = {tuple(sorted(face[[k, k - 1]].tolist())) for face in mesh.faces for k in range(3)}
     for start, end, path, _ in edge_paths(mesh, sides):
         assert mesh.topology.outer_vertex[path].tolist() == [start, end]
+
+
+@pytest.mark.parametrize("name", ["crags_with_holes", "crumpled_torus"])
+def test_astar_weight_is_all_that_a_path_along_edges_is_longer_by(name):
+    case = zoo.SMALL[name]
+    mesh = gc.TriangleMesh(case.vertices, case.faces)
+    for start, end, _, length in edge_paths(mesh, random_pairs(mesh, 10)):
+        shortest = graph.edge_distances(case.vertices, case.faces, start)[end]
+        assert shortest * (1 - 1e-12) <= length <= ASTAR_WEIGHT * shortest * (1 + 1e-12)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
+from geodesic_core.kernels.paths import funnel
 from geodesic_core.kernels.paths.funnel import (
     LEFT,
     NEITHER,
@@ -16,6 +17,7 @@ from geodesic_core.kernels.paths.funnel import (
     shortened_part,
     side_to_pass,
 )
+from geodesic_core.tolerances import PASSES, STRAIGHT
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 from tests.support.meshes import mesh_of
@@ -210,3 +212,37 @@ def test_a_string_along_a_vertex_that_several_portals_share():
     length, bends, _ = pulled(portals, (3, 2))
     assert [side for _, side in bends] == [RIGHT]
     assert length == pytest.approx(math.sqrt(2) + math.dist((1, 1), (3, 2)), rel=1e-15)
+
+
+@pytest.mark.slow
+@zoo.each_scale
+@pytest.mark.parametrize(("share", "passes"), [(0.5, False), (2.0, True)])
+@pytest.mark.parametrize("side", [LEFT, RIGHT])
+def test_straight_is_the_least_turn_that_is_taken_out(scale, share, passes, side):
+    """A string bends around the middle of a flat kite, whose other side is a little shorter."""
+    turn = share * STRAIGHT
+    rise = math.tan(turn / 2) * (-1 if side == RIGHT else 1)
+    points = np.array([(-1, 0, 0), (0, rise, 0), (1, 0, 0), (0, 1, 0), (0, -1, 0)]) * scale
+    mesh = gc.TriangleMesh(points, [(0, 1, 3), (1, 2, 3), (1, 0, 4), (2, 1, 4)])
+    path = mesh.topology.inner_vertex[[0, 1, 2]].astype(np.int32)
+    length = shortened_part(mesh.topology, path, np.array([NEITHER, side, NEITHER], np.int8))
+    bent = 2.0 * math.hypot(1.0, rise)
+    assert length == pytest.approx((2.0 if passes else bent) * scale, rel=1e-14)
+    assert bent > 2.0 * (1 + 1e-13), "else the two could not be told apart"
+
+
+@pytest.mark.skipif(not WITHOUT_JIT, reason="compiled kernels cannot be watched")
+def test_passes_are_far_more_than_a_strip_takes(monkeypatch):
+    passes = []
+
+    def counted(*arguments):
+        passes.append(1)
+        return pull_taut(*arguments)
+
+    monkeypatch.setattr(funnel, "pull_taut", counted)
+    case = zoo.KNOWN["caps"]
+    mesh = gc.TriangleMesh(case.vertices, case.faces)
+    for _, _, path, _ in edge_paths(mesh, random_pairs(mesh, 10)):
+        passes.clear()
+        funnel.shortened(mesh.topology, path)
+        assert len(passes) < PASSES / 4

@@ -34,6 +34,7 @@ from geodesic_core.kernels.mesh.half_edges import (
     OPPOSITE,
     OUT_LEFT,
     OUT_RIGHT,
+    PINCHED,
     SADDLE,
     SIN_LEFT,
     SIN_RIGHT,
@@ -43,8 +44,9 @@ from geodesic_core.kernels.mesh.half_edges import (
     previous,
 )
 from geodesic_core.mesh.canonical import half_edges_around
-from geodesic_core.tolerances import SADDLE_EXCESS
+from geodesic_core.tolerances import NO_AREA, SADDLE_EXCESS, SHARP
 from tests.support import zoo
+from tests.support.oracles import closed_forms
 from tests.support.stepping import finished, started, topology_of
 
 
@@ -263,3 +265,57 @@ def test_a_fan_of_many_faces_takes_linear_time():
 
     # A search in the bucket of the hub would take 100 times as long for 10 times the faces.
     assert min(seconds(200_000) for _ in range(2)) < 40 * min(seconds(20_000) for _ in range(3))
+
+
+@pytest.mark.parametrize(("share", "is_pinched"), [(0.99, True), (1.01, False)])
+@zoo.each_scale
+def test_no_area_is_an_angle_of_so_much(share, is_pinched, scale):
+    corners = np.array([(0, 0, 0), (1, 0, 0), (1, share * NO_AREA, 0), (0, -1, 0)]) * scale
+    topology = topology_of(zoo.Case("needle", corners, np.array([(0, 1, 2), (0, 3, 1)])))
+    flagged = topology.flags[topology.inner_vertex] & PINCHED != 0
+    assert flagged.tolist() == [is_pinched] * 3 + [False]
+
+
+@pytest.mark.parametrize("share", [0.99, 1.01])
+@zoo.each_scale
+def test_sharp_tips_end_what_winds_about_them(share, scale):
+    """A square, as seen from the tip of a cone; just above the bound windows wind as said."""
+    sides = 4
+    tilt = math.acos(share * SHARP / sides / math.sqrt(2.0))
+    vertices, faces, _, total = zoo.cone(sides, tilt)
+    assert total == pytest.approx(share * SHARP, rel=1e-4)
+    mesh = gc.TriangleMesh(vertices * scale, faces)
+    assert ((mesh.topology.flags & PINCHED) != 0).all() == (share < 1)
+    found = gc.exact_distance(mesh, 1)
+    created = found.stats.windows_created
+    assert created < 50 if share < 1 else created < 8 * sides * math.pi / SHARP
+    np.testing.assert_allclose(found.distances[0], scale, rtol=1e-14)
+
+
+def saddle_of(excess: float, splits=0):
+    """A zigzag cone whose total angle exceeds a full turn by as little; also its chart."""
+    low, high = 0.0, 1.0
+    for _ in range(200):
+        tilt = (low + high) / 2
+        *_, total = zoo.cone(8, tilt, zigzag=True)
+        low, high = (tilt, high) if total < 2 * math.pi + excess else (low, tilt)
+    return zoo.cone(8, tilt, zigzag=True, splits=splits)
+
+
+@pytest.mark.parametrize(("share", "is_saddle"), [(0.5, False), (2.0, True)])
+def test_saddle_excess_divides_saddles_from_flat_vertices(share, is_saddle):
+    vertices, faces, _, _ = saddle_of(share * SADDLE_EXCESS)
+    topology = gc.TriangleMesh(vertices, faces).topology
+    assert bool(topology.flags[topology.inner_vertex[0]] & SADDLE) == is_saddle
+
+
+@pytest.mark.jit
+@pytest.mark.parametrize("share", [0.1, 0.9])
+def test_saddle_excess_bounds_the_error_behind_a_flatter_saddle(share):
+    vertices, faces, polar, total = saddle_of(share * SADDLE_EXCESS, splits=2)
+    mesh = gc.TriangleMesh(vertices, faces)
+    for source in range(1, 9):
+        exact = closed_forms.cone(polar, source, total)
+        found = gc.exact_distance(mesh, source).distances
+        # The rim of the saddle is no circle: its vertices lie where they were computed, to 1e-16.
+        np.testing.assert_allclose(found, exact, rtol=SADDLE_EXCESS, atol=0)

@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import assume, example, given
+from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 
 from geodesic_core.kernels.front.bounds import merging_bounds
@@ -20,7 +20,7 @@ from geodesic_core.kernels.sweep.merging import (
     visibility,
 )
 from geodesic_core.kernels.sweep.trimming import leaves_gap
-from geodesic_core.tolerances import LOCAL_SHARE
+from geodesic_core.tolerances import GRAZING, LOCAL_SHARE, LOWER_BOUND
 from tests.support import zoo
 from tests.support.stepping import topology_of, view_of_arrays, window
 
@@ -161,7 +161,7 @@ def test_shortfall_is_the_most_between_the_ends(nx, ny, sx, sy, sigma, hi):
 
 @pytest.mark.parametrize("nearest", [1e-6, 1.0, 1e6])
 @pytest.mark.parametrize(("relative", "absolute"), [(1e-3, math.inf), (1e-2, 1e-4), (0.5, 1e9)])
-def test_accuracy_is_both_errors_and_the_local_share_of_them(relative, absolute, nearest):
+def test_local_share_is_all_that_one_merge_may_use_up(relative, absolute, nearest):
     view, allowed = granted(relative, absolute), min(relative * nearest, absolute)
     assert accuracy(view, 0.999 * allowed, 0.0, nearest)
     assert not accuracy(view, 1.001 * allowed, 0.0, nearest)
@@ -318,3 +318,36 @@ def test_there_is_no_gap_where_windows_do_not_meet(p, c):
     assert not leaves_gap(window(*p, 0.0, xi=1.0), window(*c, 0.0, xi=1.0))
     first, second = (0.0, 0.5, *p[2:], 0.0), (0.5, 1.0, *c[2:], 0.0)
     assert leaves_gap(window(*first, xi=1.0), window(*second, xi=1.0))
+
+
+@pytest.mark.parametrize("reach", [1e-9, 1.0, 1e9])
+def test_grazing_is_the_least_angle_of_a_merged_pseudosource(reach):
+    for share, taken in ((0.99, False), (1.01, True)):
+        angle = math.asin(share * GRAZING)
+        for along in (math.cos(angle), -math.cos(angle)):
+            assert (directionality(along * reach, reach) > 0.0) == taken
+
+
+@pytest.mark.slow
+@settings(suppress_health_check=[HealthCheck.filter_too_much])  # most cannot be merged
+@given(
+    st.floats(-2, 3), st.floats(-3, -0.01), st.floats(-2, 3), st.floats(-3, -0.01), st.floats(0, 1)
+)
+@pytest.mark.jit
+def test_lower_bound_is_all_that_a_merged_window_rises_by(s0x, s0y, s1x, s1y, joint):
+    b = 0.2 + 0.6 * joint
+    # Both windows give the same distance where they meet
+    gap = math.hypot(s0x - b, s0y) - math.hypot(s1x - b, s1y)
+    sigma0, sigma1 = max(-gap, 0.0), max(gap, 0.0)
+    first, second = (0.0, b, s0x, s0y, sigma0), (b, 1.0, s1x, s1y, sigma1)
+    can, whole = merged(granted(0.5), window(*first), window(*second))
+    assume(can)
+    sx, sy, sigma, xi = whole.sx, whole.sy, whole.sigma, whole.xi
+    assert sy < 0
+    assert sigma >= 0
+    for b0, b1, x, y, weight in (first, second):
+        places = np.linspace(b0, b1, 101)
+        before = np.hypot(places - x, y) + weight
+        after = np.hypot(places - sx, sy) + sigma
+        assert (after <= before * (1 + 100 * LOWER_BOUND)).all()
+        assert (before - after <= xi + 1e-12).all()

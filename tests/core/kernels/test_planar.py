@@ -3,12 +3,15 @@
 import cmath
 import math
 
+import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from geodesic_core.kernels.front.window import reaches
-from geodesic_core.kernels.planar import bisector, hit_left
+from geodesic_core.kernels.planar import Source, bisector, bracketed, distance, hit_left
+from geodesic_core.tolerances import DOUBLE_ROOT, FALSE_POSITION_STEPS, HALF_ULP
+from tests.support import zoo
 from tests.support.stepping import window
 
 shares = st.floats(0, 1)
@@ -88,17 +91,7 @@ def test_bisector_tells_the_branches_of_the_hyperbola_apart(swapped):
     assert at_s1 == pytest.approx(at_s0, rel=1e-12)
 
 
-@pytest.mark.parametrize("weight", [0.0, 1e-16, 1e-14, 1e-12, 1e-10, 1e-8])
-def test_bisector_of_nearly_equal_weights(weight):
-    """The quadratic is nothing but rounding there; the bisector is the straight one, nearly."""
-    s0, s1 = (0.1, -0.7), (1.2, -1.1)
-    straight = (s1[0] ** 2 + s1[1] ** 2 - s0[0] ** 2 - s0[1] ** 2) / (2 * (s1[0] - s0[0]))
-    for sign in (1, -1):
-        found = bisector(0.0, 2.0, *s0, 0.0, *s1, sign * weight)
-        assert found == pytest.approx(straight, abs=10 * weight + 1e-12)
-
-
-@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+@zoo.each_scale
 def test_bisector_scales(scale):
     unit = (0.0, 1.0, 0.2, -0.5, 0.3, 0.9, -0.8, 0.1)
     scaled = bisector(*(scale * x for x in unit))
@@ -111,3 +104,33 @@ def test_reaches_is_about_the_least_distance(u, v, sx, sy, sigma, limit):
     nearest = math.hypot(min(max(sx, b0), b1) - sx, sy) + sigma
     assume(abs(nearest - limit) > 1e-9)
     assert reaches(window(b0, b1, sx, sy, sigma), limit) == (nearest < limit)
+
+
+@pytest.mark.parametrize("delta", [0.0, *np.geomspace(1e-18, 1e-3, 31)])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_double_root_leaves_the_bisector_its_digits(delta, sign):
+    """Whichever way it is found, on both sides of the bound; nearly the straight bisector."""
+    s0, s1 = (0.1, -0.7), (1.2, -1.1)
+    straight = (s1[0] ** 2 + s1[1] ** 2 - s0[0] ** 2 - s0[1] ** 2) / (2 * (s1[0] - s0[0]))
+    x = bisector(0.0, 2.0, *s0, 0.0, *s1, sign * delta)
+    lead = math.hypot(x - s1[0], s1[1]) + sign * delta - math.hypot(x - s0[0], s0[1])
+    assert abs(lead) <= 1e-16 / DOUBLE_ROOT
+    assert abs(x - straight) <= 2 * delta + 1e-16 / DOUBLE_ROOT
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_half_ulp_and_false_position_steps_are_enough_for_any_bisector(seed):
+    """Of a parallel window, too: the lead that is left is a few roundings of the distances."""
+    x0, y0, x1, y1, angle, crossing = np.random.default_rng(seed).uniform(0.05, 1.0, 6)
+    for s0 in (Source(x0, -y0, 1.0), Source(math.cos(angle), -math.sin(angle), 0.0)):
+        s1 = Source(-x1, -y1, 1.0)
+        delta = distance(crossing, *s0) - distance(crossing, *s1)
+        ends = [distance(x, *s1) + delta - distance(x, *s0) for x in (0.0, 1.0)]
+        if ends[0] * ends[1] < 0.0:
+            x = bracketed(0.0, 1.0, s0, s1, delta)
+            r0, r1 = distance(x, *s0), distance(x, *s1)
+            assert abs(r1 + delta - r0) <= 8 * HALF_ULP * (abs(r0) + abs(r1) + abs(delta))
+
+
+def test_false_position_steps_are_more_than_bisection_would_need():
+    assert math.log2(1.0 / HALF_ULP) < FALSE_POSITION_STEPS

@@ -23,6 +23,7 @@ from geodesic_core.kernels.front.state import MARKS, SIZE, new_wavefront
 from geodesic_core.kernels.paths import edge_dijkstra
 from geodesic_core.kernels.sweep import continuous_dijkstra
 from geodesic_core.search.landmarks import Landmarks
+from geodesic_core.tolerances import SEARCH_SLACK
 from tests.conftest import WITHOUT_JIT
 from tests.support import expected, zoo
 from tests.support.approximation import MERGING
@@ -244,3 +245,40 @@ def test_visited_are_the_faces_that_were_reached_at_all_corners():
     reached = np.isfinite(wave.vertices.distance[mesh.topology.inner_vertex])
     np.testing.assert_array_equal(visited, reached[mesh.faces].all(axis=1))
     assert 0 < visited.sum() < len(visited)
+
+
+def sought(mesh, source, target, exact, limit) -> float:
+    """The distance that an exact sweep finds within a limit, bounded by exact distances itself."""
+    topology = mesh.topology
+    start, end = (int(topology.inner_vertex[v]) for v in (source, target))
+    goal = goal_at_vertex(mesh, start, limit, known=exact[topology.outer_vertex])
+    bounds = exact_bounds(math.inf, goal)
+    wave = new_wavefront(topology, pruned=True)
+    continuous_dijkstra.start_sweep(
+        topology, wave, np.array([start], np.int32), np.zeros(1, np.int32), np.zeros(1), bounds
+    )
+    wave, _ = run_sweep(mesh, wave, bounds, Control(), lambda _: 0.0)
+    return float(wave.vertices.distance[end])
+
+
+SEARCHED = {
+    name: zoo.SMALL[name]
+    for name in ("crags_with_holes", "crumpled_torus", "bow_tie_of_fans", "obstacles", "box_1x2x3")
+} | {name: zoo.KNOWN[name] for name in ("flat", "cone_ruffle", "prism_slivers", "caps")}
+
+
+@pytest.mark.jit
+@zoo.each(SEARCHED)
+def test_search_slack_keeps_the_path_itself(case):
+    """Under the tightest bounds there can be: no rounding prunes it, and anything less would."""
+    mesh = gc.TriangleMesh(case.vertices, case.faces)
+    for target in spread(case, 6):
+        exact = gc.exact_distance(mesh, target).distances
+        for source in spread(case, 9):
+            if source == target:
+                continue
+            distance = exact[source]
+            found = sought(mesh, source, target, exact, distance * (1 + SEARCH_SLACK))
+            assert found == pytest.approx(distance, rel=0.1 * SEARCH_SLACK)
+            lost = sought(mesh, source, target, exact, distance * (1 - SEARCH_SLACK))
+            assert not lost <= distance * (1 - 0.1 * SEARCH_SLACK)

@@ -7,8 +7,15 @@ import pytest
 from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 
-from geodesic_core.kernels.sweep.trimming import trim
-from tests.support.stepping import window
+from geodesic_core.kernels.front.pool import put_window
+from geodesic_core.kernels.front.state import FIRST, LAST, SIZE
+from geodesic_core.kernels.front.window import B0, B1, NEXT
+from geodesic_core.kernels.mesh.half_edges import HEAD, LENGTH, ROW, TAIL
+from geodesic_core.kernels.sweep.trim_list import trim_list
+from geodesic_core.kernels.sweep.trimming import leaves_gap, trim
+from geodesic_core.tolerances import DIVERGING, GAP, LOOSE_OVERLAP, OVERLAP, SLACK
+from tests.support import zoo
+from tests.support.stepping import flat_view, window
 
 ALONG_THE_LINE = 2e-7
 """Where both sources lie on the edge's own line the bisector has half the digits."""
@@ -119,3 +126,78 @@ def test_one_boundary_for_both(weight, first_wins_below):
     assert a[1] == b[0]
     assert a[0] == 0.0
     assert b[1] == 1.0
+
+
+def put_list(view, wave, h, windows, root):
+    slots = [put_window(view, window(*values, root=root)) for values in windows]
+    wave.pool.lists[h, [SIZE, FIRST, LAST]] = len(slots), slots[0], slots[-1]
+    for slot, after in zip(slots, [*slots[1:], -1], strict=True):
+        wave.pool.windows.view(np.int32)[slot, NEXT] = after
+
+
+def is_trimmed(overlap, difference, scale) -> bool:
+    """Of two windows on an edge of length ``scale`` that overlap by a share of it."""
+    view, wave, h = flat_view(scale)
+    b, source = 0.5 * scale, scale * np.array([(0.1, -1.0, 0.0), (1.0, -1.0, difference)])
+    left, right = (0.1 * scale, b + overlap * scale), (b, 0.9 * scale)
+    put_list(view, wave, h, [(*left, *source[0]), (*right, *source[1])], 0)
+    assert trim_list(view, h) == 2
+    ends = wave.pool.scratch[0, B1], wave.pool.scratch[1, B0]
+    return ends != (left[1], right[0])
+
+
+@pytest.mark.slow
+@zoo.each_scale
+@pytest.mark.parametrize(("share", "trimmed"), [(0.5, False), (2.0, True)])
+def test_overlap_is_the_least_that_is_trimmed(scale, share, trimmed):
+    assert is_trimmed(share * OVERLAP, 0.0, scale) == trimmed
+
+
+@zoo.each_scale
+@pytest.mark.parametrize(("share", "trimmed"), [(0.5, False), (2.0, True)])
+def test_loose_overlap_is_the_least_that_is_trimmed_of_different_sigma(scale, share, trimmed):
+    assert is_trimmed(share * LOOSE_OVERLAP, 1e-3, scale) == trimmed
+
+
+@zoo.each_scale
+@pytest.mark.parametrize(("share", "closed"), [(0.5, True), (2.0, False)])
+def test_gap_is_the_most_that_is_closed(scale, share, closed):
+    view, wave, h = flat_view(scale)
+    b, gap = 0.5 * scale, share * GAP * scale
+    source = (0.5 * scale, -scale, 0.0)
+    put_list(view, wave, h, [(0.1 * scale, b, *source), (b + gap, 0.9 * scale, *source)], 0)
+    assert trim_list(view, h) == 2
+    assert (wave.pool.scratch[1, B0] == b) == closed
+    assert wave.pool.scratch[1, B0] - b <= gap * (1 + 1e-3)
+    # The ray through the closed gap is off by no more than the gap, and so is its length.
+    here, there = (math.hypot(x - source[0], source[1]) for x in (b, b + gap))
+    assert abs(here - there) <= gap
+
+
+@zoo.each_scale
+@pytest.mark.parametrize(("detour", "kept"), [(-1.0, True), (0.0, True), (0.5, True), (3.0, False)])
+@pytest.mark.parametrize("from_tail", [True, False])
+def test_slack_keeps_windows_that_tie_with_a_vertex(scale, detour, kept, from_tail):
+    """At the far end of the window: against the path through the vertex and along the edge."""
+    view, wave, h = flat_view(scale)
+    length = view.mesh.geometry[ROW * h + LENGTH]
+    tail, head = view.mesh.links[ROW * h + TAIL], view.mesh.links[ROW * h + HEAD]
+    wave.vertices.distance[[tail, head]] = 1e6 * scale  # as good as unreached
+    wave.vertices.distance[tail if from_tail else head] = scale
+    b0, b1 = 0.25 * length, 0.75 * length
+    far = b1 if from_tail else length - b0
+    straight = (scale + far) + detour * SLACK * scale
+    sy = -0.3 * scale
+    reach = math.sqrt(straight**2 - sy**2)
+    sx = b1 - reach if from_tail else b0 + reach
+    put_list(view, wave, h, [(b0, b1, sx, sy, 0.0)], tail)
+    assert trim_list(view, h) == kept
+
+
+@pytest.mark.parametrize(("share", "is_gap"), [(0.5, False), (2.0, True)])
+@zoo.each_scale
+def test_diverging_is_the_least_angle_between_rays_that_leave_a_gap(share, is_gap, scale):
+    left = (0.0, 0.5, 0.5 + share * DIVERGING, -1.0, 0.0, 1.0)
+    right = (0.5, 1.0, 0.5, -1.0, 0.0, 1.0)
+    both = (window(*(scale * x for x in values)) for values in (left, right))
+    assert leaves_gap(*both) == is_gap

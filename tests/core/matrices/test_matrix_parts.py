@@ -10,9 +10,9 @@ from scipy.sparse import load_npz
 
 import geodesic_core as gc
 from geodesic_core.matrices import matrix_parts, plan
-from tests.core.fields.test_points import SAME, random_points
+from tests.core.fields.test_points import SAME
 from tests.support import zoo
-from tests.support.meshes import mesh_of
+from tests.support.meshes import mesh_of, random_points
 
 ROWS = 2
 METHODS: list[dict[str, Any]] = [

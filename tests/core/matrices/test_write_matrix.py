@@ -23,10 +23,10 @@ from geodesic_core.matrices.blocks import Blocks
 from geodesic_core.matrices.formats import sha256_of
 from geodesic_core.matrices.plan import sweep_order
 from geodesic_core.matrices.rows import ExactRows
-from tests.core.fields.test_points import EXACT, random_points
+from tests.core.fields.test_points import EXACT
 from tests.support import zoo
 from tests.support.faults import flip_bytes
-from tests.support.meshes import mesh_of
+from tests.support.meshes import mesh_of, random_points
 from tests.support.oracles import unfolding
 from tests.support.splitting import split_at
 from tests.support.waiting import wait_until

@@ -1,9 +1,12 @@
 """Whatever is wrong is refused, by type, and the message names the element."""
 
+import math
+
 import numpy as np
 import pytest
 
 import geodesic_core as gc
+from geodesic_core.tolerances import LARGEST_COORDINATE, SHORTEST_EDGE
 from tests.support import zoo
 
 POINTS = np.array([(0.0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)])
@@ -385,3 +388,28 @@ def test_several_masked_vertices_are_counted():
 def test_arrays_that_mask_nothing_are_as_others():
     mesh = gc.TriangleMesh(np.ma.masked_array(POINTS), np.ma.masked_less(FACES, 0))
     assert mesh.faces.tolist() == FACES.tolist()
+
+
+@pytest.mark.parametrize(("share", "is_taken"), [(1.0, True), (1.01, False)])
+def test_largest_coordinate_is_the_most_that_is_taken(share, is_taken):
+    points, faces = zoo.octahedron()
+    points = points / np.abs(points).max()
+    vertices = share * LARGEST_COORDINATE * points
+    if is_taken:
+        distance = gc.exact_distance(gc.TriangleMesh(vertices, faces), 0).distances
+        expected = gc.exact_distance(gc.TriangleMesh(points, faces), 0).distances
+        np.testing.assert_allclose(distance / LARGEST_COORDINATE, expected, rtol=1e-14)
+    else:
+        with pytest.raises(gc.errors.InvalidMesh, match="at most"):
+            gc.TriangleMesh(vertices, faces)
+
+
+@pytest.mark.parametrize(("share", "is_taken"), [(1.01, True), (0.99, False)])
+def test_shortest_edge_is_the_least_that_is_taken(share, is_taken):
+    vertices = share * SHORTEST_EDGE * np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], float)
+    if is_taken:
+        distance = gc.exact_distance(gc.TriangleMesh(vertices, [(0, 1, 2)]), 1).distances
+        np.testing.assert_allclose(distance / vertices[1, 0], [1, 0, math.sqrt(2)], rtol=1e-14)
+    else:
+        with pytest.raises(gc.errors.InvalidMesh, match="shorter than"):
+            gc.TriangleMesh(vertices, [(0, 1, 2)])

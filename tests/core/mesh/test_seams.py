@@ -420,3 +420,36 @@ def test_the_remedy_joins_however_narrow_the_gap_is(gap: float) -> None:
     (told,) = (words for words in gc.TriangleMesh(left + right, faces).warnings if "apart" in words)
     remedy = float(told.partition("merge=")[2].partition(" ")[0])
     assert gc.TriangleMesh(left + right, faces, merge=remedy).report.components == 1
+
+
+@zoo.each_scale
+@pytest.mark.parametrize(("share", "is_told"), [(0.99, True), (1.01, False)])
+def test_nearly_joined_is_a_share_of_the_height_of_both_vertices(share, is_told, scale):
+    """Of each pair along two squares, one is the corner of a face 1/√2 high."""
+    gap = share * NEARLY_JOINED * math.sqrt(0.5)
+    corners = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
+    faces = [(0, 1, 2), (0, 2, 3), (4, 5, 6), (4, 6, 7)]
+    both = scale * np.vstack([corners, corners + np.array([1.0 + gap, 0.0, 0.0])])
+    told = gc.TriangleMesh(both, faces).report.near_vertices
+    assert told.ids == (((1, 4), (2, 7)) if is_told else ())
+
+
+@zoo.each_scale
+@pytest.mark.parametrize(("share", "is_told"), [(0.99, True), (1.01, False)])
+def test_nearly_joined_is_a_share_of_the_height_of_an_edge(share, is_told, scale):
+    """Half the height of its ends, for a vertex that is far higher."""
+    edge = np.array([(0, 0, 0), (0, 1, 0), (1, 0.5, 0)])
+    height = np.linalg.norm(np.cross(edge[1], edge[2])) / np.linalg.norm(edge[2])
+    beside = share * NEARLY_JOINED * height / 2.0
+    large = np.array([(-beside, 0.5, 0), (-9, 9, 0), (-9, -9, 0)])
+    mesh = gc.TriangleMesh(scale * np.vstack([edge, large]), [(0, 2, 1), (3, 4, 5)])
+    assert mesh.report.t_junctions.ids == ((3,) if is_told else ())
+
+
+@pytest.mark.parametrize(("share", "is_told"), [(0.99, False), (1.01, True)])
+def test_nearly_joined_is_a_share_of_an_edge_at_its_ends(share, is_told):
+    """Nearer to an end, no vertex counts as on the edge."""
+    edge = [(0, 0, 0), (0, 1, 0), (1, 0.5, 0)]
+    other = [(0, share * NEARLY_JOINED, 0), (-1.0, 0.1, 0), (-1.0, 0.0, 0)]
+    report = gc.TriangleMesh(edge + other, [(0, 2, 1), (3, 4, 5)]).report
+    assert (3 in report.t_junctions.ids) == is_told

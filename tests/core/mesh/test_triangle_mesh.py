@@ -1,9 +1,12 @@
 """The mesh: its report, its warnings, merging, and what a store keeps of it."""
 
+import math
+
 import numpy as np
 import pytest
 
 import geodesic_core as gc
+from geodesic_core.tolerances import ROUGH, ROUGH_VERTICES, SHARP_SADDLE
 
 TRIANGLE = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
 TETRAHEDRON = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
@@ -108,3 +111,29 @@ def test_is_frozen_and_apart_from_what_was_given():
         mesh.vertices = mesh.vertices * 10  # type: ignore[misc]
     assert mesh.vertices.max() == 1
     assert repr(mesh) == "TriangleMesh(4 vertices, 4 faces)"
+
+
+def is_rough(saddles: int, excess: float, vertices: int = 2 * ROUGH_VERTICES) -> bool:
+    """Whether a flat mesh counts as rough when some of its vertices have so much excess."""
+    mesh = gc.samples.plane(8)
+    angles = np.full(vertices, 2 * math.pi)
+    angles[:saddles] += excess
+    rough = mesh.topology._replace(total_angle=angles)
+    vars(mesh)["embedding"] = mesh.embedding._replace(topology=rough)
+    return mesh.is_rough
+
+
+@pytest.mark.parametrize(("excess", "expected"), [(0.99, False), (1.01, True)])
+def test_sharp_saddle_is_the_least_excess_that_makes_a_mesh_rough(excess, expected):
+    assert is_rough(2 * ROUGH_VERTICES, excess * SHARP_SADDLE) == expected
+
+
+@pytest.mark.parametrize(("share", "expected"), [(0.99, False), (1.01, True)])
+def test_rough_is_the_least_share_of_sharp_saddles(share, expected):
+    assert is_rough(round(share * ROUGH * 2 * ROUGH_VERTICES), 1.0) == expected
+
+
+@pytest.mark.parametrize(("vertices", "expected"), [(-1, False), (0, True)])
+def test_rough_vertices_are_the_fewest_of_a_rough_mesh(vertices, expected):
+    count = ROUGH_VERTICES + vertices
+    assert is_rough(count, 1.0, count) == expected

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 import geodesic_core as gc
 from geodesic_core.mesh.triangulation import triangulated
+from geodesic_core.tolerances import FAN
 from tests.support import zoo
 from tests.support.oracles import visibility
 
@@ -190,3 +191,15 @@ def test_distances_in_a_polygon_are_those_of_its_visibility_graph(seed):
     for source in range(0, len(loop), 3):
         found = gc.exact_distance(mesh, source).distances
         np.testing.assert_allclose(found, expected[rows[source], rows], rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize(("bulge", "is_kept"), [(0.1, False), (10.0, True)])
+@zoo.each_scale
+def test_fan_has_no_sliver_below_its_share(bulge, is_kept, scale):
+    """A square whose bottom bends at its middle corner, by a triangle of so much of the share."""
+    height = bulge * FAN * 4
+    square = [(0, 0), (1, -height), (2, 0), (2, 2), (0, 2)]
+    points = np.insert(np.array(square, float) * scale, 2, 0.0, axis=1)
+    faces, face_map = triangulated(points, np.arange(5), np.array([5]))
+    assert ([0, 1, 2] in faces.tolist()) == is_kept
+    assert face_map.tolist() == [0, 0, 0]

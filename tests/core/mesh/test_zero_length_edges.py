@@ -7,9 +7,9 @@ import pytest
 
 import geodesic_core as gc
 from tests.conftest import WITHOUT_JIT
-from tests.core.fields.test_points import random_points
 from tests.support import zoo
 from tests.support.certificates import check_path
+from tests.support.meshes import random_points
 from tests.support.searches import buy_landmarks
 
 ALL = zoo.SMALL | zoo.IRREGULAR

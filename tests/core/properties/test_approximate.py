@@ -9,7 +9,6 @@ from tests.core.properties.test_exact import seeds, vertex_of
 from tests.support import zoo
 from tests.support.approximation import ERRORS, ROUNDING, check_approximate_path, check_within
 from tests.support.meshes import mesh_of
-from tests.support.oracles import graph, unfolding
 from tests.support.random_meshes import cases
 
 errors = st.sampled_from(ERRORS)
@@ -28,30 +27,11 @@ def solve(vertices, faces, source, error):
     return gc.approximate_distance(gc.TriangleMesh(vertices, faces), source, error).distances
 
 
-@given(cases(), seeds, errors)
-def test_agrees_with_the_oracle(case, seed, error):
-    mesh = mesh_of(case)
-    matrix = unfolding.distance_matrix(case.vertices, case.faces)
-    for source in {0, vertex_of(case, seed), vertex_of(case, seed + 1)}:
-        found = gc.approximate_distance(mesh, source, error).distances
-        check_within(found, matrix[source], error)
-
-
 @given(split_cases(), seeds, errors)
 def test_agrees_with_exact_distances(case, seed, error):
     mesh, source = mesh_of(case), vertex_of(case, seed)
     exact = gc.exact_distance(mesh, source).distances
     check_within(gc.approximate_distance(mesh, source, error).distances, exact, error)
-
-
-@given(cases(), seeds, errors)
-def test_between_euclid_and_dijkstra(case, seed, error):
-    source = vertex_of(case, seed)
-    distances = solve(case.vertices, case.faces, source, error)
-    euclid = np.linalg.norm(case.vertices - case.vertices[source], axis=1)
-    assert (distances >= euclid * (1 - error - 1e-12)).all()
-    on_edges = graph.edge_distances(case.vertices, case.faces, source)
-    assert (distances <= on_edges * (1 + 1e-12)).all()
 
 
 @given(split_cases(), seeds, errors)

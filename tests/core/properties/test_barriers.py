@@ -9,25 +9,11 @@ from hypothesis import given
 import geodesic_core as gc
 from tests.core.properties.test_exact import seeds
 from tests.support.certificates import check_path
+from tests.support.known import blocked_at_random
 from tests.support.meshes import mesh_of
-from tests.support.oracles import unfolding
 from tests.support.random_meshes import cases
 
 pytestmark = pytest.mark.filterwarnings("ignore::geodesic_core.errors.BlockedSource")
-
-EXACT = 1e-9
-"""Relative error allowed against the oracle."""
-
-
-def blocked_at_random(case, rng):
-    """Random faces, up to half of them, one by one or as a patch; and the faces that are free."""
-    count = int(rng.integers(1, 1 + len(case.faces) // 2))
-    barriers = rng.choice(len(case.faces), count, replace=False)
-    if rng.random() < 0.5:
-        centroids = case.vertices[case.faces].mean(axis=1)
-        away = np.linalg.norm(centroids - centroids[barriers[0]], axis=1)
-        barriers = np.argsort(away, kind="stable")[:count]
-    return barriers, np.setdiff1d(np.arange(len(case.faces)), barriers)
 
 
 def random_points(mesh, free, rng):
@@ -37,17 +23,6 @@ def random_points(mesh, free, rng):
         yield gc.SurfacePoint.face(face, (u, v, w))
         yield gc.SurfacePoint.edge(face, int(rng.integers(3)), u)
         yield int(mesh.faces[face, 0])
-
-
-@given(cases(), seeds)
-def test_agrees_with_the_oracle_of_the_free_faces(case, seed):
-    rng = np.random.default_rng(seed)
-    barriers, free = blocked_at_random(case, rng)
-    mesh = mesh_of(case).with_barriers(barriers)
-    matrix = unfolding.distance_matrix(case.vertices, case.faces[free])
-    for source in rng.integers(0, len(case.vertices), 3).tolist():
-        found = gc.exact_distance(mesh, source).distances
-        np.testing.assert_allclose(found, matrix[source], rtol=EXACT, atol=0)
 
 
 @given(cases(), seeds)
@@ -84,19 +59,6 @@ def test_paths_keep_to_free_faces(case, seed):
         if math.isfinite(distance):
             check_path(mesh, field.path_to(target), source, target, distance)
             check_path(mesh, solver.shortest_path(source, target), source, target, distance)
-
-
-@given(cases(), seeds)
-def test_barriers_never_shorten_a_distance(case, seed):
-    rng = np.random.default_rng(seed)
-    barriers, _ = blocked_at_random(case, rng)
-    mesh = mesh_of(case)
-    source = int(rng.integers(len(case.vertices)))
-    distances = gc.exact_distance(mesh, source).distances
-    for some in (barriers[: len(barriers) // 2], barriers):
-        longer = gc.exact_distance(mesh, source, barriers=some).distances
-        assert (longer >= distances * (1 - 1e-12)).all()
-        distances = longer
 
 
 @given(cases(), seeds)

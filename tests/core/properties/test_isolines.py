@@ -5,9 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import geodesic_core as gc
-from tests.core.fields.test_points import random_points
 from tests.support.isoline_checks import check_crossings, check_ends, check_pieces, check_points
-from tests.support.meshes import mesh_of
+from tests.support.meshes import mesh_of, random_points
 from tests.support.random_meshes import cases
 
 

@@ -1,4 +1,4 @@
-"""On planes all is known, however thin the triangles: windows cross, overlap and nest."""
+"""Curves on planes, where all is known, however thin the triangles: windows cross and overlap."""
 
 import numpy as np
 from hypothesis import given
@@ -7,19 +7,12 @@ import geodesic_core as gc
 from tests.core.fields.test_curves import random_curve
 from tests.core.properties.test_approximate import errors
 from tests.core.properties.test_exact import seeds
-from tests.support import zoo
-from tests.support.oracles import visibility
+from tests.support.known import thin_plane
+from tests.support.meshes import mesh_of
 
 EXACT = 1e-9
 ROUNDING = 1e-12
 """Absolute error allowed, as a share of the size of the mesh."""
-
-
-def thin_plane(rng) -> gc.TriangleMesh:
-    """A rectangle of random triangles, of an aspect down to some 1e-4."""
-    columns, rows, seed = rng.integers((2, 2, 0), (7, 7, 2**31)).tolist()
-    points, faces = zoo.grid(columns, rows, seed=seed, jitter=0.24)
-    return gc.TriangleMesh(points * (1, 10.0 ** -rng.uniform(0, 4), 1), faces)
 
 
 def random_points(mesh, rng, count) -> list[gc.SurfacePoint]:
@@ -28,22 +21,8 @@ def random_points(mesh, rng, count) -> list[gc.SurfacePoint]:
     return [gc.SurfacePoint.face(f, tuple(w)) for f, w in zip(faces, weights, strict=True)]
 
 
-def random_sources(mesh, rng) -> list[gc.Source]:
-    """Points, some of which start later than others."""
-    points = random_points(mesh, rng, int(rng.integers(1, 8)))
-    starts = rng.choice([0, 1], len(points)) * rng.uniform(0, 0.3, len(points))
-    size = np.ptp(mesh.vertices, axis=0).max()
-    return [gc.Source(p, float(s * size)) for p, s in zip(points, starts, strict=True)]
-
-
 def positions(mesh, points) -> np.ndarray:
     return np.array([mesh.position(point) for point in points])
-
-
-def to_nearest(points, mesh, sources) -> np.ndarray:
-    places = positions(mesh, [source.point for source in sources])
-    ways = np.linalg.norm(points[:, None] - places, axis=-1)
-    return (ways + [source.start_distance for source in sources]).min(axis=1)
 
 
 def to_curve(points, mesh, curve) -> np.ndarray:
@@ -71,23 +50,9 @@ def check_targets(mesh, field, expected, starts, targets, error=0.0) -> None:
 
 
 @given(seeds)
-def test_from_points(seed):
-    rng = np.random.default_rng(seed)
-    mesh = thin_plane(rng)
-    sources, targets = random_sources(mesh, rng), random_points(mesh, rng, 3)
-    starts = [source.start_distance for source in sources]
-
-    field = gc.exact_distance(mesh, sources)
-
-    check(mesh, field.distances, to_nearest(mesh.vertices, mesh, sources))
-    expected = to_nearest(positions(mesh, targets), mesh, sources)
-    check_targets(mesh, field, expected, starts, targets)
-
-
-@given(seeds)
 def test_from_a_curve(seed):
     rng = np.random.default_rng(seed)
-    mesh = thin_plane(rng)
+    mesh = mesh_of(thin_plane(rng))
     curve, targets = random_curve(mesh, rng), random_points(mesh, rng, 3)
 
     field = gc.exact_distance(mesh, curve)
@@ -97,77 +62,12 @@ def test_from_a_curve(seed):
     check_targets(mesh, field, expected, [0.0], targets)
 
 
-@given(seeds)
-def test_between_two_points(seed):
-    rng = np.random.default_rng(seed)
-    mesh = thin_plane(rng)
-    ends = random_points(mesh, rng, 2)
-
-    path = gc.shortest_path(mesh, *ends)
-
-    start, end = positions(mesh, ends)
-    check(mesh, np.array([path.length]), np.array([np.linalg.norm(end - start)]))
-
-
-@given(seeds, errors)
-def test_within_an_error_from_points(seed, error):
-    rng = np.random.default_rng(seed)
-    mesh = thin_plane(rng)
-    sources, targets = random_sources(mesh, rng), random_points(mesh, rng, 3)
-    starts = [source.start_distance for source in sources]
-
-    field = gc.approximate_distance(mesh, sources, error)
-
-    check(mesh, field.distances, to_nearest(mesh.vertices, mesh, sources), error)
-    expected = to_nearest(positions(mesh, targets), mesh, sources)
-    check_targets(mesh, field, expected, starts, targets, error)
-
-
 @given(seeds, errors)
 def test_within_an_error_from_a_curve(seed, error):
     rng = np.random.default_rng(seed)
-    mesh = thin_plane(rng)
+    mesh = mesh_of(thin_plane(rng))
     curve = random_curve(mesh, rng)
 
     field = gc.approximate_distance(mesh, curve, error)
 
     check(mesh, field.distances, to_curve(mesh.vertices, mesh, curve), error)
-
-
-@given(seeds, errors)
-def test_among_obstacles(seed, error):
-    """With corners that are pseudosources; positions are integers, so that the oracle is exact."""
-    rng = np.random.default_rng(seed)
-    columns, rows, holes = rng.integers((3, 3, 1), (6, 5, 4)).tolist()
-    points, faces = zoo.grid(columns, rows, seed=seed, jitter=0.22)
-    cells = [tuple(rng.integers((columns, rows)).tolist()) for _ in range(holes)]
-    points, faces = zoo.drop_unused(points, zoo.without_cells(faces, columns, cells))
-    planar = np.rint(points[:, :2] * (1e6, 10.0 ** rng.uniform(2.5, 6))).astype(int)
-    mesh = gc.TriangleMesh(np.insert(planar.astype(float), 2, 0, axis=1), faces)
-    places, sources = [], []
-    for face in rng.integers(len(faces), size=int(rng.integers(1, 5))).tolist():
-        corners = planar[faces[face]]
-        place = np.rint(rng.dirichlet(np.ones(3)) @ corners).astype(int)
-        (ax, ay), (bx, by) = (np.roll(corners, -k, axis=0).T - place[:, None] for k in (1, 2))
-        areas = ax * by - ay * bx
-        if areas.min() > 0:
-            places.append(place)
-            sources.append(gc.SurfacePoint.face(face, tuple((areas / areas.sum()).tolist())))
-    if not sources:
-        return
-    table = visibility.distance_matrix(np.vstack([planar, places]), faces)[len(planar) :]
-    expected = table[:, : len(planar)].min(axis=0)
-    reached = np.flatnonzero(np.isfinite(expected))
-
-    field = gc.exact_distance(mesh, sources)
-
-    assert (np.isfinite(field.distances) == np.isfinite(expected)).all()
-    check(mesh, field.distances[reached], expected[reached])
-    rough = gc.approximate_distance(mesh, sources, error)
-    check(mesh, rough.distances[reached], expected[reached], error)
-    for target in rng.choice(reached, 2).tolist():
-        length = field.path_to(target).length
-        check(mesh, np.array([length]), expected[[target]])
-        if np.isfinite(table[0, target]):
-            length = gc.shortest_path(mesh, sources[0], target).length
-            check(mesh, np.array([length]), table[[0], target])

@@ -1,5 +1,6 @@
 """Landmarks: what they are bounds of, when they are added, and what they cost."""
 
+import math
 import time
 
 import numpy as np
@@ -7,19 +8,25 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.control import Control
-from geodesic_core.kernels.front.bounds import LANDMARKS
+from geodesic_core.kernels.front.bounds import LANDMARKS, exact_bounds
+from geodesic_core.kernels.front.pruning import least_to_start
+from geodesic_core.kernels.front.state import new_wavefront
 from geodesic_core.search.landmarks import Landmarks
-from geodesic_core.tolerances import LANDMARK_ERROR
+from geodesic_core.tolerances import LANDMARK_ERROR, SINGLE_PRECISION
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
+from tests.support.approximation import MERGING
 from tests.support.searches import (
     answer,
     buy_landmarks,
     check_searches,
+    goal_at_vertex,
     landmark_count,
     random_pairs,
     solver_of,
+    spread,
 )
+from tests.support.stepping import view_of_arrays
 
 SINGLE = 2.0**-24
 """Relative rounding of single precision."""
@@ -217,3 +224,36 @@ def test_paths_where_single_precision_ends(scale):
         expected = small.shortest_path(source, target).length
         found = solver.shortest_path(source, target).length
         assert found == pytest.approx(scale * expected, rel=1e-9, abs=0)
+
+
+def test_single_precision_is_more_than_rounding_to_it():
+    numbers = np.random.default_rng(0).uniform(1.0, 2.0, 10_000)
+    assert (abs(numbers.astype(np.float32) - numbers) < 0.1 * SINGLE_PRECISION * numbers).all()
+
+
+@pytest.mark.jit
+@zoo.each(MERGING)
+def test_landmark_error_is_all_that_landmarks_fall_short(case):
+    """Their bounds make up for it; taken as exact, their distances would bound too much."""
+    mesh = gc.TriangleMesh(case.vertices, case.faces)
+    topology = mesh.topology
+    landmarks = Landmarks(mesh)
+    landmarks.add(0, Control())
+    stored = landmarks.distances[:, 0].astype(float)
+    place = int(topology.outer_vertex[stored.argmin()])
+    exact = gc.exact_distance(mesh, place).distances[topology.outer_vertex]
+    assert (stored <= exact * (1 + 1e-7)).all()
+    assert (stored >= exact * (1 - LANDMARK_ERROR) * (1 - 1e-7)).all()
+    assert (stored < exact * (1 - 0.01 * LANDMARK_ERROR)).any(), "else nothing was merged"
+    naive = 0.0
+    for start in spread(case, 6):
+        goal = goal_at_vertex(mesh, start, landmarks=landmarks)
+        view = view_of_arrays(
+            topology, new_wavefront(topology, pruned=True), exact_bounds(math.inf, goal)
+        )
+        distances = gc.exact_distance(mesh, int(topology.outer_vertex[start])).distances
+        distances = distances[topology.outer_vertex]
+        bounds = np.array([least_to_start(view, v, 0.0) for v in range(len(distances))])
+        assert (bounds <= distances * (1 + 1e-12)).all()
+        naive = max(naive, (np.abs(stored - stored[start]) - distances).max())
+    assert naive > 0

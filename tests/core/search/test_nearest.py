@@ -8,55 +8,9 @@ import pytest
 import geodesic_core as gc
 from geodesic_core.kernels.front.counters import CREATED
 from geodesic_core.search import target_sweep
-from tests.core.fields.test_points import EXACT, SAME, random_points
+from tests.core.fields.test_points import SAME
 from tests.support import zoo
-from tests.support.meshes import mesh_of
-from tests.support.oracles import unfolding
-from tests.support.splitting import split_at
-
-
-def check_nearest(found, distances, k, rtol=SAME, limit=math.inf):
-    """What is found are the k least of the distances that are within the limit."""
-    distances = np.asarray(distances)
-    count = min(k, int((distances <= limit).sum()))
-    assert found.indices.shape == found.distances.shape == (count,)
-    assert len(set(found.indices.tolist())) == count
-    np.testing.assert_allclose(found.distances, distances[found.indices], rtol, 1e-12)
-    np.testing.assert_allclose(found.distances, np.sort(distances)[:count], rtol, 1e-12)
-
-
-@pytest.mark.slice(3)
-@pytest.mark.jit
-@zoo.each(zoo.SMALL)
-def test_the_nearest_are_those_of_the_oracle(case):
-    mesh = mesh_of(case)
-    points = random_points(mesh, 10, seed=31)
-    vertices, faces, at = split_at(mesh, points)
-    expected = unfolding.distance_matrix(vertices, faces)[np.ix_(at, at)]
-    solver = gc.Solver(mesh)
-    for source, distances in zip(points, expected, strict=True):
-        for k in (1, 3, 10):
-            found = gc.nearest(mesh, source, points, k)
-            check_nearest(found, np.where(np.isinf(distances), np.nan, distances), k, EXACT)
-            again = solver.nearest(source, points, k)
-            np.testing.assert_array_equal(again.indices, found.indices)
-            np.testing.assert_array_equal(again.distances, found.distances)
-
-
-@zoo.each({name: zoo.SMALL[name] for name in ("crags", "crumpled_torus", "two_components")})
-@pytest.mark.jit
-def test_the_nearest_are_those_of_a_field(case):
-    mesh = mesh_of(case)
-    points = random_points(mesh, 8, seed=32)
-    source, candidates = points[0], points[1:]
-    field = gc.exact_distance(mesh, source, targets=candidates)
-    distances = [field.distance_at(point) for point in candidates]
-    limit = float(np.sort(distances)[2]) * (1 + 1e-9)
-    reachable = [d if math.isfinite(d) else math.nan for d in distances]
-    for k in (1, 2, 7):
-        check_nearest(gc.nearest(mesh, source, candidates, k), reachable, k)
-        near = gc.nearest(mesh, source, candidates, k, limit)
-        check_nearest(near, reachable, k, limit=limit)
+from tests.support.meshes import mesh_of, random_points
 
 
 def test_equal_distances_go_by_the_lowest_index():

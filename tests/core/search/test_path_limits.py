@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
+from geodesic_core.tolerances import AT_LIMIT
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 from tests.support.searches import buy_landmarks, check_search, random_pairs, solver_of
@@ -205,3 +206,18 @@ def test_faces_without_area_between_vertices_at_one_place():
         path = gc.shortest_path(mesh, source, target)
         assert path.length == 2.0
         np.testing.assert_array_equal(path.points[1], vertices[1])
+
+
+@zoo.each_scale
+@pytest.mark.parametrize(("share", "is_found"), [(0.9, True), (1.1, False)])
+def test_at_limit_is_how_much_longer_a_path_to_a_point_may_be(scale, share, is_found):
+    mesh = gc.TriangleMesh(np.eye(3)[[0, 0, 1]] * scale * [[0], [1], [1]], [[0, 1, 2]])
+    middle = gc.SurfacePoint.edge(0, 0, 0.5)
+    limit = 0.5 * scale / (1.0 + share * AT_LIMIT)
+    found = gc.distance_matrix(mesh, [0], [middle], limit, "pairs")
+    assert np.isfinite(found).tolist() == [is_found]
+    if is_found:
+        assert gc.shortest_path(mesh, 0, middle, max_distance=limit).length == 0.5 * scale
+    else:
+        with pytest.raises(gc.errors.NoPath):
+            gc.shortest_path(mesh, 0, middle, max_distance=limit)

@@ -1,15 +1,12 @@
 """Paths between two points, against the full sweep and the oracles, on the zoo."""
 
-import math
-
 import numpy as np
 import pytest
 
 import geodesic_core as gc
 from tests.conftest import WITHOUT_JIT
-from tests.support import expected, zoo
+from tests.support import zoo
 from tests.support.certificates import LENGTH
-from tests.support.oracles import closed_forms, visibility
 from tests.support.searches import (
     check_search,
     check_searches,
@@ -21,77 +18,6 @@ from tests.support.searches import (
 
 EXACT = 1e-9
 """Relative error allowed against an oracle, as of exact fields."""
-
-
-@pytest.mark.slice(3)
-@zoo.each(zoo.SMALL | zoo.IRREGULAR)
-@pytest.mark.jit
-def test_small_meshes_between_vertices_everywhere(case):
-    solver = solver_of(case)
-    for source in spread(case, 2 if WITHOUT_JIT else 8):
-        check_searches(solver, source, spread(case, 4 if WITHOUT_JIT else 12))
-    assert landmark_count(solver) > 0, "else only searches without landmarks were tried"
-
-
-@pytest.mark.slice(3)
-@zoo.each(zoo.SMALL | zoo.IRREGULAR)
-def test_small_meshes_against_unfolding(case):
-    solver = solver_of(case)
-    for source in spread(case, 2 if WITHOUT_JIT else 10):
-        for target in spread(case, 4 if WITHOUT_JIT else 50):
-            distance = expected.matrix(case)[source, target]
-            if math.isfinite(distance):
-                path = solver.shortest_path(source, target)
-                assert path.length == pytest.approx(distance, rel=EXACT, abs=0)
-
-
-@pytest.mark.slow
-@pytest.mark.slice(2)
-@pytest.mark.jit
-@pytest.mark.parametrize("name", ["annulus", "obstacles", "comb", "pinched_holes"])
-def test_among_holes_in_the_plane(name):
-    case = zoo.SMALL[name]
-    solver = solver_of(case)
-    matrix = visibility.distance_matrix(case.vertices[:, :2], case.faces)
-    for source, target in random_pairs(solver.mesh, 200):
-        path = solver.shortest_path(source, target)
-        assert path.length == pytest.approx(matrix[source, target], rel=1e-12, abs=0)
-
-
-def check_known(case, sources, targets):
-    solver = solver_of(case)
-    for source in sources:
-        check_searches(solver, source, targets)
-        distances = case.distances(source)
-        for target in targets:
-            path = solver.shortest_path(source, target)
-            assert path.length == pytest.approx(distances[target], rel=EXACT, abs=0)
-
-
-@pytest.mark.slice(3)
-@pytest.mark.jit
-@zoo.each(zoo.KNOWN)
-def test_closed_forms(case):
-    check_known(case, spread(case, 5), spread(case, 11))
-
-
-@pytest.mark.full
-@pytest.mark.jit
-@zoo.each(zoo.KNOWN)
-def test_closed_forms_between_many_vertices(case):
-    check_known(case, spread(case, 40), spread(case, 51))
-
-
-@pytest.mark.slow
-@pytest.mark.jit
-@pytest.mark.parametrize("name", ["slivers_1e-05", "crowded_lines", "pleats_slivers"])
-@pytest.mark.parametrize("scale", [1e-9, 1e9])
-def test_slivers_after_motion_and_scaling(name, scale):
-    """What was flat is only nearly so, and the bounds of the search round differently."""
-    case = zoo.KNOWN[name].moved(scale * zoo.rotation(3), scale * np.array((1.0, 2.0, -3.0)))
-    solver = solver_of(case)
-    for source in spread(case, 4):
-        check_searches(solver, source, spread(case, 9))
 
 
 @pytest.mark.jit
@@ -124,14 +50,6 @@ def test_an_upper_bound_belongs_to_the_path_of_its_ends():
 
 
 # Several equally short paths --------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", closed_forms.REGULAR)
-def test_regular_solids(name):
-    solver = solver_of(zoo.SMALL[name])
-    ends = range(len(zoo.SMALL[name].vertices))
-    lengths = sorted(solver.shortest_path(0, end).length for end in ends)
-    np.testing.assert_allclose(lengths, closed_forms.REGULAR[name], rtol=1e-14)
 
 
 @pytest.mark.slow

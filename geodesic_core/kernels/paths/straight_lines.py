@@ -1,0 +1,278 @@
+"""Straightest lines: from a point in a direction, straight on over edges and through vertices.
+
+A line is straight on a face, and over an edge in the unfolded plane. Through a vertex it goes with
+equal angles on both sides, each of them half of the vertex's total angle (Polthier and Schmies,
+*Straightest Geodesics on Polyhedral Surfaces*, 1998). It ends where it is as long as asked for, or
+where it cannot go on.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from geodesic_core.arrays import Floats, Ints, Longs
+from geodesic_core.kernels.jit import inlined, kernel
+from geodesic_core.kernels.mesh.half_edges import (
+    APEX,
+    APEX_ANGLE,
+    BOUNDARY,
+    COS_LEFT,
+    COS_RIGHT,
+    FANS,
+    HEAD,
+    LENGTH,
+    LENGTH_LEFT,
+    LENGTH_RIGHT,
+    NO_FACE,
+    OPPOSITE,
+    SIN_LEFT,
+    SIN_RIGHT,
+    TAIL,
+    Topology,
+    following,
+    previous,
+)
+from geodesic_core.tolerances import THROUGH_VERTEX
+
+# Why a line ends
+GOES_ON = 0
+AT_LENGTH = 1
+AT_BOUNDARY = 2
+AT_VERTEX = 3  # lines are to end at vertices
+AT_NON_MANIFOLD = 4  # an edge of several faces, or a vertex where several fans meet
+
+# Columns of the state of lines, a row each
+VERTEX = 0  # int: the line is at this vertex; -1 where it is on a half-edge
+HALF_EDGE = 1  # int: the line is on it, about to cross its face
+STOP = 2  # int: see above
+INTS = 3
+ANGLE = 0  # float: at a vertex, the direction in its unfolded fan, radians
+X = 1  # float: on a half-edge, the position in its frame
+Y = 2  # float: 0 but at the end of a line
+DX = 3  # float: the direction in that frame, a unit vector
+DY = 4
+LEFT = 5  # float: length left to go, mesh units
+FLOATS = 6
+
+
+class Line(NamedTuple):
+    """A line at a vertex, or on a half-edge whose face it is about to cross."""
+
+    vertex: int
+    half_edge: int
+    stop: int
+    angle: float
+    x: float
+    y: float
+    dx: float
+    dy: float
+    left: float
+
+
+class Trail(NamedTuple):
+    """Points at which lines cross edges and vertices, each with the face crossed before."""
+
+    lines: Ints
+    """(N,): the line of each point"""
+    nodes: Ints
+    """(N,): a half-edge, or -1 - an inner vertex"""
+    parameters: Floats
+    """(N,): share of the half-edge from its tail"""
+    faces: Ints
+    """(N,): inner face"""
+
+
+@kernel
+def trace_lines(
+    topology: Topology, ints: Longs, floats: Floats, first: int, stops: bool, trail: Trail
+) -> tuple[int, int]:
+    """Trace lines from row ``first`` on, until all end or the trail is full.
+
+    Return the first line that has not ended, and the number of points on the trail, which are those
+    where lines leave faces. With ``stops`` lines end at vertices. Modifies the rows: where a line
+    ends, HALF_EDGE, X and Y say where, and DX and DY in which direction; at a vertex, VERTEX and
+    ANGLE do.
+    """
+    count, room, links = 0, len(trail.nodes), topology.links
+    for i in range(first, len(ints)):
+        line = load_line(ints, floats, i)
+        while line.stop == GOES_ON and count < room:
+            if line.vertex >= 0:
+                line = into_corner(topology, line)
+            line, m, parameter = cross_face(topology, line)
+            if line.stop != GOES_ON:
+                break
+            v = vertex_at(links, m, parameter)
+            trail.lines[count], trail.nodes[count] = i, -1 - v if v >= 0 else m
+            trail.parameters[count], trail.faces[count] = parameter, line.half_edge // 3
+            count += 1
+            if v >= 0:
+                line = through_vertex(topology, line, v, stops)
+            else:
+                line = over_edge(topology, line, m, parameter)
+        store_line(ints, floats, i, line)
+        if line.stop == GOES_ON:
+            return i, count
+    return len(ints), count
+
+
+@inlined
+def load_line(ints: Longs, floats: Floats, i: int) -> Line:
+    """Return the line of row i."""
+    return Line(
+        ints[i, VERTEX],
+        ints[i, HALF_EDGE],
+        ints[i, STOP],
+        floats[i, ANGLE],
+        floats[i, X],
+        floats[i, Y],
+        floats[i, DX],
+        floats[i, DY],
+        floats[i, LEFT],
+    )
+
+
+@inlined
+def store_line(ints: Longs, floats: Floats, i: int, line: Line) -> None:
+    """Write a line to row i. Modifies both arrays."""
+    ints[i, VERTEX], ints[i, HALF_EDGE], ints[i, STOP] = line.vertex, line.half_edge, line.stop
+    floats[i, ANGLE], floats[i, X], floats[i, Y] = line.angle, line.x, line.y
+    floats[i, DX], floats[i, DY], floats[i, LEFT] = line.dx, line.dy, line.left
+
+
+@kernel
+def into_corner(topology: Topology, line: Line) -> Line:
+    """Return a line at a vertex as one on the half-edge that begins the corner it goes into."""
+    corner, last = topology.first_corner[line.vertex], topology.first_corner[line.vertex + 1]
+    while corner + 1 < last and topology.corner_angles[corner + 1] <= line.angle:
+        corner += 1
+    inward = line.angle - topology.corner_angles[corner]
+    h: Any = np.int64(topology.corners[corner])  # one type of a line
+    dy = max(math.sin(inward), 0.0)
+    return Line(-1, h, GOES_ON, line.angle, 0.0, 0.0, math.cos(inward), dy, line.left)
+
+
+@kernel
+def cross_face(topology: Topology, line: Line) -> tuple[Line, int, float]:
+    """Cross the face ahead; return the line, and the node and the parameter where it leaves it.
+
+    The line returned is where it leaves the face, or where it ends within it, in the frame that it
+    entered by.
+    """
+    geometry, h, x, dx, dy = topology.geometry, line.half_edge, line.x, line.dx, line.dy
+    length, to_left = geometry[h, LENGTH], geometry[h, LENGTH_LEFT]
+    ax, ay = geometry[h, COS_LEFT] * to_left, geometry[h, SIN_LEFT] * to_left
+    to_apex = math.hypot(ax - x, ay)
+    turn = dx * ay - dy * (ax - x)  # times the distance of the apex: how far the line passes it by
+    if dy <= THROUGH_VERTEX:  # along the half-edge
+        far = length - x if dx > 0.0 else x
+        node, parameter = h, 1.0 if dx > 0.0 else 0.0
+    elif abs(turn) <= THROUGH_VERTEX * to_apex:
+        far, node, parameter = to_apex, previous(h), 0.0
+    elif turn > 0.0:  # over the edge from the head to the apex
+        cosine, sine = geometry[h, COS_RIGHT], geometry[h, SIN_RIGHT]
+        rise = dx * sine + dy * cosine
+        far, node = (length - x) * sine / rise, following(h)
+        parameter = (length - x) * dy / rise / geometry[h, LENGTH_RIGHT]
+    else:  # over the edge from the tail to the apex
+        cosine, sine = geometry[h, COS_LEFT], geometry[h, SIN_LEFT]
+        rise = dy * cosine - dx * sine
+        far, node = x * sine / rise, previous(h)
+        parameter = 1.0 - x * dy / rise / to_left
+    if line.left <= far:
+        x, y = x + line.left * dx, line.left * dy
+        return Line(-1, h, AT_LENGTH, 0.0, x, y, dx, dy, 0.0), node, parameter
+    rest = line.left - far
+    return Line(-1, h, GOES_ON, 0.0, x + far * dx, far * dy, dx, dy, rest), node, parameter
+
+
+@inlined
+def vertex_at(links: Ints, m: int, parameter: float) -> int:
+    """Return the end of a half-edge that a share of it is, or -1."""
+    v: Any = np.int64(-1)
+    if parameter <= THROUGH_VERTEX:
+        v = np.int64(links[m, TAIL])
+    elif 1.0 - parameter <= THROUGH_VERTEX:
+        v = np.int64(links[m, HEAD])
+    return v
+
+
+@kernel
+def over_edge(topology: Topology, line: Line, m: int, parameter: float) -> Line:
+    """Return a line that leaves its face by the half-edge m, in the frame of the face beyond."""
+    geometry, h, dx, dy = topology.geometry, line.half_edge, line.dx, line.dy
+    across: Any = np.int64(topology.links[m, OPPOSITE])
+    if across < 0:
+        stop = AT_BOUNDARY if across == NO_FACE else AT_NON_MANIFOLD
+        return Line(-1, h, stop, 0.0, line.x, line.y, dx, dy, line.left)
+    if m == following(h):
+        cosine, sine = geometry[h, COS_RIGHT], geometry[h, SIN_RIGHT]
+    else:
+        cosine, sine = geometry[h, COS_LEFT], -geometry[h, SIN_LEFT]
+    x = (1.0 - parameter) * geometry[m, LENGTH]
+    dx, dy = dx * cosine - dy * sine, dx * sine + dy * cosine
+    return Line(-1, across, GOES_ON, 0.0, x, 0.0, dx, dy, line.left)
+
+
+@kernel
+def through_vertex(topology: Topology, line: Line, v: int, stops: bool) -> Line:
+    """Return a line that comes to v as it goes straight on, or ends there.
+
+    At a boundary it goes on where the surface has half a turn on one side of it, and on one alone.
+    Where it cannot go on, its direction is half a turn from where it came.
+    """
+    total, back = topology.total_angle[v], direction_back(topology, line, v)
+    stop, onward = GOES_ON, back + math.pi
+    if topology.flags[v] & FANS:
+        stop = AT_NON_MANIFOLD
+    elif topology.flags[v] & BOUNDARY:
+        is_left = total - back >= math.pi - THROUGH_VERTEX
+        if is_left == (back >= math.pi - THROUGH_VERTEX):
+            stop = AT_BOUNDARY
+        else:
+            onward = min(onward, total) if is_left else max(back - math.pi, 0.0)
+    else:
+        onward = back + 0.5 * total
+        if onward >= total:
+            onward -= total
+    if stops and stop == GOES_ON:
+        stop = AT_VERTEX
+    x, y, dx, dy = line.x, line.y, line.dx, line.dy
+    return Line(v, line.half_edge, stop, onward, x, y, dx, dy, line.left)
+
+
+@kernel
+def direction_back(topology: Topology, line: Line, v: int) -> float:
+    """Direction at v, in its unfolded fan, in which a line came that crossed the face of v."""
+    geometry, h = topology.geometry, line.half_edge
+    if topology.links[h, APEX] == v:
+        ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
+        ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
+        turn = math.atan2(ax * line.dy - ay * line.dx, ax * line.dx + ay * line.dy)
+        return float(geometry[h, APEX_ANGLE]) + max(turn, 0.0)
+    if topology.links[h, TAIL] == v:
+        return float(geometry[following(h), APEX_ANGLE])
+    at_head = math.atan2(geometry[h, SIN_RIGHT], geometry[h, COS_RIGHT])
+    return float(geometry[previous(h), APEX_ANGLE]) + at_head
+
+
+@kernel
+def enter_face(geometry: Floats, h: int, x: float, y: float, angle: float, left: float) -> Line:
+    """Return a line from a point inside a face, as if it had come in over an edge.
+
+    (x, y) and ``angle`` are in the frame of h.
+    """
+    dx, dy, nearest = math.cos(angle), math.sin(angle), math.inf
+    line = Line(-1, h, GOES_ON, 0.0, x, 0.0, dx, dy, left)
+    for _ in range(3):
+        if dy > 0.0 and y < nearest * dy:
+            nearest = y / dy
+            place = min(max(x - nearest * dx, 0.0), geometry[h, LENGTH])
+            line = Line(-1, h, GOES_ON, 0.0, place, 0.0, dx, dy, left + nearest)
+        # To the frame of the following half-edge
+        cosine, sine, x = -geometry[h, COS_RIGHT], geometry[h, SIN_RIGHT], x - geometry[h, LENGTH]
+        x, y = x * cosine + y * sine, y * cosine - x * sine
+        dx, dy = dx * cosine + dy * sine, dy * cosine - dx * sine
+        h = following(h)
+    return line
