@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +25,6 @@ from app.queries.views import table_of_matrix, table_of_sparse
 from app.schemas.requests import Layout, MatrixRequest
 from app.settings import Settings
 from app.store.meshes import OpenMesh
-
-if TYPE_CHECKING:
-    pass
 
 _CELLS = "cells of the matrix"
 _IN_PARTS: Mapping[Layout, str] = {"dense": NPY, "sparse": NPZ}
