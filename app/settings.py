@@ -145,12 +145,6 @@ class Settings(BaseSettings):
     """Size of these copies; one that was removed is fetched again when needed."""
     engine: Literal["local", "ray"] = "local"
     """`local` computes on this machine, `ray` on the hosts of a cluster."""
-    address: str | None = None
-    """Address of the head of the cluster, as `H:P`."""
-    cluster_token: Annotated[SecretStr, Field(min_length=16)] | None = None
-    """Secret of the cluster, the same on all its machines; anyone with it can run code there."""
-    redis: SecretStr | None = None
-    """URL of a Redis or Valkey for the records of a head; by default they are in its folder."""
     state: SecretStr | None = None
     """URL of a PostgreSQL database that several services share; by default SQLite in the store."""
     workers: PositiveInt = Field(default_factory=available_cores)
@@ -253,18 +247,6 @@ class Settings(BaseSettings):
             raise ValueError("it is not a URL such as postgresql://user:secret@host:5432/database")
         return state
 
-    @field_validator("redis")
-    @classmethod
-    def _is_of_redis(cls, redis: SecretStr | None) -> SecretStr | None:
-        url = None if redis is None else urlsplit(redis.get_secret_value())
-        if url is not None and not (
-            url.scheme in ("redis", "rediss")
-            and url.hostname
-            and not (url.path.strip("/") or url.query or url.fragment)
-        ):
-            raise ValueError("it is not a URL such as redis://user:secret@host:6379")
-        return redis
-
     @field_validator("root_path")
     @classmethod
     def _is_a_prefix(cls, path: str) -> str:
@@ -306,10 +288,6 @@ class Settings(BaseSettings):
 
     @model_validator(mode="after")
     def _agrees_with_itself(self) -> Self:
-        if self.engine == "ray" and self.address is None:
-            raise ValueError(
-                "GEODESIC_ENGINE is ray: set GEODESIC_ADDRESS to the address of the head"
-            )
         if self.auth == "off" and self.api_keys:
             raise ValueError("GEODESIC_AUTH is off, but GEODESIC_API_KEYS has keys")
         for small, large in _AT_MOST:

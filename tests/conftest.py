@@ -22,7 +22,6 @@ pytest_plugins = [
     "tests.support.databases",
     "tests.support.logs",
     "tests.support.postgres",
-    "tests.support.redis",
     "tests.support.s3",
     "tests.support.gcs",  # after what it imports, as the next
     "tests.support.against",

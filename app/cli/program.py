@@ -7,7 +7,7 @@ import typer
 from typer.exceptions import TyperException
 
 from app import __version__
-from app.cli import batch, cluster, cluster_status, compilation, meshes, queries, serve, tables
+from app.cli import batch, compilation, meshes, queries, serve, tables
 from app.cli.steps import Failure, show_help_without_command
 from app.cli.store import store
 from app.cli.words import refusal_of, with_options
@@ -75,8 +75,6 @@ def _options(
 
 for command in (
     serve.serve,
-    cluster.head,
-    cluster.node,
     meshes.info,
     queries.distance,
     queries.path,
@@ -94,4 +92,3 @@ for command in (
 
 cli.command("compile")(compilation.compile_kernels)
 cli.add_typer(store, name="store")
-cli.add_typer(cluster_status.cluster, name="cluster")

@@ -3,13 +3,14 @@
 import gc
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from signal import SIGHUP, SIGTERM, raise_signal, signal
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from app.access import is_loopback
-from app.cli.cluster import Address, Store, joined_if_asked
 from app.cli.configuration import read_settings
 from app.cli.steps import Failure
 from app.engine import fork_server
@@ -29,8 +30,12 @@ def serve(
         str | None,
         typer.Option(help="local, or ray for the hosts of a cluster; by default GEODESIC_ENGINE."),
     ] = None,
-    address: Address = None,
-    store: Store = None,
+    store: Annotated[
+        str | None,
+        typer.Option(
+            help="Shared folder, or URL such as s3://bucket/x; by default GEODESIC_STORE."
+        ),
+    ] = None,
     state: Annotated[
         str | None, typer.Option(help="URL of a PostgreSQL database that several services share.")
     ] = None,
@@ -49,7 +54,7 @@ def serve(
     from app.store.layout import StoreError
 
     gc.enable()
-    settings = read_settings(engine=engine, address=address, store=store, state=state)
+    settings = read_settings(engine=engine, store=store, state=state)
     _refuse_without_keys(host, settings)
     logs.install(settings.log_format)
     try:
@@ -62,10 +67,26 @@ def serve(
     server = server_of(app, host, port, settings)
     # A closed terminal ends the service in the same order.
     signal(SIGHUP, lambda *_: raise_signal(SIGTERM))
-    with joined_if_asked(settings):
+    with _in_cluster_if_asked(settings):
         server.run()
     if not server.started:
         raise typer.Exit(1)
+
+
+@contextmanager
+def _in_cluster_if_asked(settings: "Settings") -> Iterator[None]:
+    """Be a client of the cluster inside the block, where the settings say so."""
+    if settings.engine == "local":
+        yield
+        return
+    from app.engine.ray_cluster import ClusterError, joined
+
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(joined())
+        except ClusterError as error:
+            raise Failure(str(error)) from error
+        yield
 
 
 def _refuse_without_keys(host: str, settings: "Settings") -> None:

@@ -17,10 +17,10 @@ class Occupancy:
         return self.pending < self.workers + is_small
 
 
-def choose(key: str, hosts: Mapping[str, Occupancy], *, is_small: bool) -> str | None:
-    """Return the host for a task; None where there is no host.
+def ranked(key: str, hosts: Mapping[str, Occupancy], *, is_small: bool) -> list[str]:
+    """Return the hosts for a task, the best one first.
 
-    By rendezvous hashing each key has an order of all hosts. It is the same for every replica, and
+    By rendezvous hashing each key has an order of all hosts. It is the same for every service, and
     a host that leaves or joins changes nothing in the order of the others. A task goes to the first
     in that order that has room. So the work on a mesh stays where the mesh is open, and spreads to
     as many hosts as it keeps busy, always in the same order. Where no host has room, it goes to the
@@ -35,11 +35,14 @@ def choose(key: str, hosts: Mapping[str, Occupancy], *, is_small: bool) -> str |
     is_small
         Whether the task is small.
     """
-    order = preference(key, hosts)
-    for host in order:
-        if hosts[host].has_room(is_small=is_small):
-            return host
-    return min(order, key=lambda host: hosts[host].pending / hosts[host].workers, default=None)
+
+    def excess(host: str) -> float:
+        occupancy = hosts[host]
+        if occupancy.has_room(is_small=is_small):
+            return 0.0
+        return occupancy.pending / occupancy.workers
+
+    return sorted(preference(key, hosts), key=excess)
 
 
 def preference(key: str, hosts: Mapping[str, Occupancy]) -> list[str]:

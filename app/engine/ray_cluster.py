@@ -1,137 +1,110 @@
-"""Ray as the carrier of messages: each machine has one actor, which is a host."""
+"""The way into a cluster of Ray, which ``ray start`` makes of machines, and the hosts on them."""
 
-import asyncio
-import sys
-from collections.abc import Collection, Sequence
-from contextlib import ExitStack
-from typing import Any, TypeVar
+import logging
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from typing import Any
 
-import structlog
+NAMESPACE = "geodesic"
+APPLICATION, DEPLOYMENT = "geodesic", "host"
+RESOURCE = "geodesic"
+"""Of each machine that is to have a host"""
 
-from app import logs
-from app.engine import fork_server
-from app.engine.cluster import HostLostError
-from app.engine.host import Host
-from app.engine.interface import Engine
-from app.engine.local import LocalEngine
-from app.engine.supplied import SuppliedEngine
-from app.settings import Settings
-from app.store import layout
-from app.store.choice import store_of
-
-logger = structlog.get_logger(module=__name__)
-
+_MOST_HOSTS = 32
+"""Hosts that Ray would start; those beyond the machines wait until one joins"""
 _MOST_CALLS = 100_000
-"""Calls that an actor takes at the same time: those that wait in its queue too, and beats"""
-_PREFIX = "host "
-"""Begins the name of each host's actor"""
-
-T = TypeVar("T")
-
-
-class HostActor:
-    """A host, in a process of Ray's.
-
-    Ray starts the process anew where it died. The engine starts with the first beat.
-    """
-
-    def __init__(self, settings: Settings, store: str) -> None:
-        # The fork server imports the main program of its parent, which would be Ray's.
-        vars(sys.modules["__main__"]).pop("__file__", None)
-        logs.install(settings.log_format)
-        fork_server.start()
-        engine: Engine = LocalEngine(settings, settings.folder / layout.RESULTS)
-        supply = store_of(settings).supply
-        if supply is not None:
-            self._folder = ExitStack()
-            self._folder.enter_context(supply.owned())  # as long as this process lives
-            engine = SuppliedEngine(engine, supply)
-        self._host = Host(engine, settings, store)
-        self._is_started = False
-
-    async def run(self, ticket: str, task: bytes) -> bytes:
-        """Do a task, see ``Cluster``."""
-        return await self._host.run(ticket, task)
-
-    async def stop(self, ticket: str) -> None:
-        """Stop a task, see ``Cluster``."""
-        self._host.stop(ticket)
-
-    async def beat(self, tickets: Sequence[str]) -> bytes:
-        """Renew leases and report, see ``Cluster``."""
-        if not self._is_started:
-            self._is_started = True
-            await self._host.start()
-        return self._host.beat(tickets)
-
-    async def drain(self) -> None:
-        """Refuse new work, and return when there is none left."""
-        await self._host.drain()
-
-    async def close(self) -> None:
-        """End all work."""
-        await self._host.close()
+"""Calls at one host: they wait in the queue of its engine, where callers take turns"""
+_CHECK_S, _CHECK_TIMEOUT_S = 1.0, 5.0
+VARIABLES = {
+    "RAY_SERVE_USE_GRPC_BY_DEFAULT": "1",  # a third of the time, and a host hears of lost callers
+    "RAY_SERVE_REPLICA_GRPC_MAX_MESSAGE_LENGTH": str(2**31 - 1),  # 4 MiB otherwise
+    "RAY_SERVE_RUN_ROUTER_IN_SEPARATE_LOOP": "0",
+    "RAY_SERVE_RUN_USER_CODE_IN_SEPARATE_THREAD": "0",
+    "RAY_SERVE_LOG_TO_STDERR": "0",  # our own log tells what matters
+}
+"""Of all processes that call hosts, or are one; Ray reads them when it is imported"""
 
 
-def start_host(settings: Settings, store: str) -> Any:
-    """Make a host of this machine, which has joined the cluster; return its actor.
+class ClusterError(Exception):
+    """There is no way into the cluster; the message says what to do."""
 
-    ``store`` is the id of the store: an actor that starts again must not wait for it.
+
+def set_variables() -> None:
+    """Set the variables of Ray for this process; nothing of Ray is imported yet."""
+    if find_spec("ray") is None:
+        raise ClusterError("Ray is not installed: pip install 'geodesic[cluster]'")
+    os.environ.update(VARIABLES)
+
+
+@contextmanager
+def joined() -> Iterator[None]:
+    """Be a client of the cluster inside the block, which has a host on each of its machines.
+
+    Raises ``ClusterError`` where Ray does not run on this machine.
     """
     import ray
-    from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
-    node = ray.get_runtime_context().get_node_id()
-    options = {
-        "name": _PREFIX + node,
-        "num_cpus": 0,
-        "max_concurrency": _MOST_CALLS,
-        "max_restarts": -1,
-        "scheduling_strategy": NodeAffinitySchedulingStrategy(node, soft=False),
+    on_end = signal.getsignal(signal.SIGTERM)
+    try:
+        ray.init("auto", namespace=NAMESPACE, log_to_driver=False, logging_level=logging.ERROR)
+    except (ConnectionError, ValueError) as error:
+        raise ClusterError(
+            f"this machine is in no cluster ({error}): run `ray start` first, see docs/scaling.md"
+        ) from error
+    signal.signal(signal.SIGTERM, on_end)  # Ray has set one of its own
+    _end_listener()
+    try:
+        _deploy()
+        yield
+    finally:
+        ray.shutdown()
+
+
+def _end_listener() -> None:
+    """Have Ray's thread that prints errors of the cluster end once the head is away.
+
+    It would ask again and again then, without a pause, and burn a core.
+    """
+    from ray._private.worker import global_worker
+
+    global_worker.threads_stopped.set()
+
+
+def _deploy() -> None:
+    """Have Ray keep a host on each machine with our resource, on those that join later too."""
+    from ray import serve
+    from ray.serve.config import RequestRouterConfig
+
+    from app.engine.ray_host import Host
+
+    serve.start(proxy_location="Disabled")
+    if APPLICATION in serve.status().applications:
+        return
+    router: dict[str, Any] = {
+        "request_router_class": "app.engine.ray_router:ChosenHosts",
+        "request_routing_stats_period_s": _CHECK_S,
+        "request_routing_stats_timeout_s": _CHECK_TIMEOUT_S,
     }
-    return ray.remote(HostActor).options(**options).remote(settings, store)
-
-
-class RayCluster:
-    """See ``Cluster``; for a process that has joined the cluster."""
-
-    def __init__(self) -> None:
-        self._actors: dict[str, Any] = {}
-
-    async def hosts(self) -> Collection[str]:
-        """Return the names of the actors that are hosts; those known before without the head."""
-        from ray.exceptions import RayError
-
-        try:
-            self._actors = await asyncio.to_thread(self._find)
-        except (RayError, RuntimeError, ValueError) as error:
-            logger.warning("hosts not listed", error=repr(error))
-        return self._actors.keys()
-
-    def _find(self) -> dict[str, Any]:
-        import ray
-
-        names = [name for name in ray.util.list_named_actors() if name.startswith(_PREFIX)]
-        return {name: self._actors.get(name) or ray.get_actor(name) for name in names}
-
-    async def run(self, host: str, ticket: str, task: bytes) -> bytes:
-        """Do a task, see ``Cluster``."""
-        outcome: bytes = await self._call(host, "run", ticket, task)
-        return outcome
-
-    async def stop(self, host: str, ticket: str) -> None:
-        """Stop a task, see ``Cluster``."""
-        await self._call(host, "stop", ticket)
-
-    async def beat(self, host: str, tickets: Sequence[str]) -> bytes:
-        """Renew leases, see ``Cluster``."""
-        report: bytes = await self._call(host, "beat", tickets)
-        return report
-
-    async def _call(self, host: str, method: str, *arguments: object) -> Any:
-        from ray.exceptions import RayError
-
-        try:
-            return await getattr(self._actors[host], method).remote(*arguments)
-        except (RayError, KeyError) as error:
-            raise HostLostError(host) from error
+    host: Any = serve.deployment(
+        Host,
+        name=DEPLOYMENT,
+        num_replicas=_MOST_HOSTS,
+        max_replicas_per_node=1,
+        max_ongoing_requests=_MOST_CALLS,
+        request_router_config=RequestRouterConfig(**router),
+        health_check_period_s=_CHECK_S,
+        health_check_timeout_s=_CHECK_TIMEOUT_S,
+        graceful_shutdown_timeout_s=20,
+        logging_config={"enable_access_log": False},
+        ray_actor_options={
+            "num_cpus": 0,
+            "resources": {RESOURCE: 1},
+            "runtime_env": {"env_vars": VARIABLES},
+        },
+    )
+    # Its hosts are never all there, so that nobody waits for them.
+    target = serve.RunTarget(target=host.bind(), name=APPLICATION, route_prefix=None)
+    serve.run_many([target], wait_for_applications_running=False)

@@ -29,9 +29,9 @@ class SingleFlight(Generic[T]):
     def __init__(self) -> None:
         self._flights: dict[str, _Flight[T]] = {}
 
-    def under_way(self) -> dict[str, bool]:
-        """Return the names of all, with whether each has begun."""
-        return {name: flight.has_begun for name, flight in self._flights.items()}
+    def names(self) -> list[str]:
+        """Return the names of all."""
+        return list(self._flights)
 
     async def join(
         self,

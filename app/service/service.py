@@ -266,10 +266,12 @@ class Service:
 
 def _engine(settings: Settings, store: Store) -> Engine:
     if settings.engine == "ray":  # nothing else imports what several machines need
-        from app.engine.distributed import DistributedEngine
-        from app.engine.ray_cluster import RayCluster
+        from app.engine.ray_cluster import set_variables
 
-        return DistributedEngine(RayCluster(), settings, store)
+        set_variables()
+        from app.engine.ray_engine import RayEngine
+
+        return RayEngine(store)
     from app.engine.local import LocalEngine
 
     engine = LocalEngine(settings, settings.folder / layout.RESULTS)

@@ -31,8 +31,6 @@ class Failure:
     """Statuses and codes that clients may see because of it"""
     breaks: Callable[[Deployment], Replica | None] = field(default=lambda _: None)
     """The replica whose connections end"""
-    orphans: Callable[[Deployment], Sequence[Part]] = field(default=lambda _: ())
-    """Nodes that may have work whose replica cannot be reached"""
 
 
 def busiest(deployment: Deployment) -> tuple[Part, int]:
@@ -107,8 +105,8 @@ def kill_replica(deployment: Deployment, _: None) -> None:
     replica.start()
 
 
-def drain_node(_deployment: Deployment, node: Part) -> None:
-    """End a node in order, as for an upgrade, and start it again."""
+def stop_node(_deployment: Deployment, node: Part) -> None:
+    """Stop a node, as for an upgrade, and start it again."""
     node.end()
     time.sleep(RESTART_S)
     node.start()
@@ -118,9 +116,7 @@ FAILURES = (
     Failure("nothing", lambda *_: None),
     Failure("a worker is killed", kill_worker, busiest, ((500, "worker_died"),)),
     Failure("a host is killed, and comes back", kill_host, busiest_node),
-    Failure(
-        "a host is cut off for 20 s", cut_host_off, busiest_node, orphans=lambda each: each.nodes
-    ),
+    Failure("a host is cut off for 20 s", cut_host_off, busiest_node),
     Failure("the head is killed, and comes back after 10 s", _kill_head(AWAY_S)),
     Failure(
         "the store does not answer for 10 s",
@@ -136,8 +132,7 @@ FAILURES = (
         "a replica is killed, and comes back after 10 s",
         kill_replica,
         breaks=lambda each: each.replicas[1],
-        orphans=lambda each: each.nodes,
     ),
-    Failure("a node is drained by SIGTERM", drain_node, busiest_node),
+    Failure("a node is stopped by SIGTERM", stop_node, busiest_node),
     Failure("the head is killed, and comes back after 5 minutes", _kill_head(LONG_AWAY_S)),
 )

@@ -8,7 +8,7 @@ from benchmarks.failures.trial import Trial
 from benchmarks.tables import machine, rated, table
 
 LIMIT_S = 10.0
-"""Within which a request gets its answer or refusal, and orphaned work ends"""
+"""Within which a request gets its answer or refusal"""
 
 
 ABOUT = (
@@ -32,7 +32,6 @@ COLUMNS = (
     "slowest small answer, s",
     "promised",
     "lost",
-    "orphaned work ended after, s",
     "recovered after, s",
     "started again",
 )
@@ -62,7 +61,6 @@ def write_report(trials: Sequence[Trial], path: Path) -> str:
 
 
 def _row(trial: Trial) -> list[str]:
-    orphans = [rated(each, LIMIT_S, at_least=False) for each in trial.orphans_s]
     return [
         trial.failure.name,
         f"{len(trial.exchanges):,}",
@@ -72,7 +70,6 @@ def _row(trial: Trial) -> list[str]:
         f"{trial.slowest_s:.1f}",
         str(sum(trial.promises.values())),
         rated(len(trial.lost), 0, at_least=False, digits=0),
-        ", ".join(orphans) or "none",
         f"{trial.as_before - trial.begin:.1f}",
         ", ".join(trial.restarts) or "none",
     ]

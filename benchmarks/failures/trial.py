@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from threading import Event, Thread
 from typing import Any
 
 import httpx2
@@ -20,7 +19,7 @@ from benchmarks.failures.failures import Failure
 from benchmarks.failures.plan import Load
 from benchmarks.soak.plan import MIB, SECRETS, digest_of
 from benchmarks.soak.trial import ROOT, Exchange
-from tests.support.deployment import Deployment, Part, Replica
+from tests.support.deployment import Deployment, Replica
 from tests.support.processes import total_time
 from tests.support.waiting import LONG_S, wait_until
 
@@ -36,7 +35,6 @@ WORKERS = 4
 IDLE, BUSY = 'geodesic_workers{state="idle"}', 'geodesic_workers{state="busy"}'
 BEFORE, AFTER = 200, 200
 """Requests that are answered before the failure, and after all is as before"""
-STOPPED = "work stopped, since nobody renews it"
 
 
 @dataclass(frozen=True)
@@ -51,8 +49,6 @@ class Trial:
     """When it was over: the cable was back, or whatever supervises the command had started it"""
     as_before: float
     """When all workers were there again, and all replicas ready"""
-    orphans_s: Sequence[float]
-    """Seconds until hosts stopped work that nobody renewed any more"""
     lost: Sequence[str]
     """Promises that were not kept"""
     promises: Mapping[str, int]
@@ -104,13 +100,12 @@ def try_out(deployment: Deployment, load: Load, failure: Failure) -> Trial:
         with _traffic(deployment, load, failure, folder) as record:
             _wait_for_answers(record, BEFORE)
             chosen = failure.choose(deployment)
-            with _stopped_work(failure.orphans(deployment)) as orphans:
-                begin = time.monotonic()
-                failure.happen(deployment, chosen)
-                end = time.monotonic()
-                restarts = _restore(deployment)
-                as_before = time.monotonic()
-                _wait_for_answers(record, len(_lines(record)) + AFTER)
+            begin = time.monotonic()
+            failure.happen(deployment, chosen)
+            end = time.monotonic()
+            restarts = _restore(deployment)
+            as_before = time.monotonic()
+            _wait_for_answers(record, len(_lines(record)) + AFTER)
         last = time.monotonic()
         _wait_until_idle(deployment)
         idle, promises = time.monotonic(), _lines(folder / "promises")
@@ -120,7 +115,6 @@ def try_out(deployment: Deployment, load: Load, failure: Failure) -> Trial:
             begin,
             end,
             as_before,
-            [at - begin for at in orphans],
             list(_broken(deployment, failure, promises)),
             Counter(kind for each in promises for kind in ("job", "mesh") if kind in each),
             restarts,
@@ -213,34 +207,6 @@ def _is_whole(replica: Replica) -> bool:
         metrics.get(f'geodesic_workers{{state="{state}"}}', 0.0) for state in ("idle", "busy")
     ]
     return sum(states) == WORKERS
-
-
-@contextmanager
-def _stopped_work(nodes: Sequence[Part]) -> Iterator[Sequence[float]]:
-    """Note the times at which the logs of hosts say that they have stopped orphaned work."""
-    seen: list[float] = []
-    over = Event()
-
-    def count() -> int:
-        return sum(
-            log.read_text(errors="replace").count(STOPPED)
-            for node in nodes
-            for log in Path(node.arguments[-1]).glob("session_latest/logs/worker-*")
-        )
-
-    def look(known: int) -> None:
-        while not over.wait(0.1):
-            found = count()
-            seen.extend([time.monotonic()] * (found - known))
-            known = max(found, known)
-
-    looking = Thread(target=look, args=(count(),))
-    looking.start()
-    try:
-        yield seen
-    finally:
-        over.set()
-        looking.join()
 
 
 def _broken(

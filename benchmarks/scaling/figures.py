@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 import geodesic_core as gc
-from app.engine.placement import Occupancy, choose
+from app.engine.placement import Occupancy, ranked
 from app.store.mesh_catalog import MeshCatalog
 from app.store.mesh_home import MeshRecord
 from app.store.meshes import MeshStore
@@ -187,4 +187,4 @@ def _copies() -> float:
 
 def _placing(count: int) -> float:
     hosts = {f"host {i}": Occupancy(0, 16) for i in range(count)}
-    return spent(lambda: [choose(f"{i:032x}", hosts, is_small=True) for i in range(20)]) / 20
+    return spent(lambda: [ranked(f"{i:032x}", hosts, is_small=True) for i in range(20)]) / 20

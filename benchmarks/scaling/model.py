@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import simpy
 
-from app.engine.placement import Occupancy, choose
+from app.engine.placement import Occupancy, ranked
 
 BEAT_S = 0.25
 """Seconds between two exchanges of a replica with a host, as in `app.engine.cluster`"""
@@ -194,7 +194,7 @@ class Model:
         """Yield the meshes whose questions go to a host while that is not busy."""
         idle = dict.fromkeys(self._names, Occupancy(0, self.shape.workers))
         for mesh in itertools.count():
-            if choose(str(mesh), idle, is_small=True) == f"host {host}":
+            if ranked(str(mesh), idle, is_small=True)[0] == f"host {host}":
                 yield mesh
 
     def answer_all(self, questions: Iterable[Question]) -> Sequence[Answer]:
@@ -248,7 +248,7 @@ class Model:
             name: Occupancy(replica.own[i] + replica.others[i], self.shape.workers)
             for name, i in self._names.items()
         }
-        chosen = choose(str(question.mesh), known, is_small=question.is_small)
+        chosen = ranked(str(question.mesh), known, is_small=question.is_small)[0]
         assert chosen is not None, "there are hosts"  # noqa: S101
         return self._names[chosen]
 

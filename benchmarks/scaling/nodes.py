@@ -1,12 +1,8 @@
 """Nodes that run here, and the load on them: the real service, asked at times that are known."""
 
 import itertools
-import os
 import random
 import re
-import socket
-import subprocess
-import sys
 import tempfile
 import threading
 import time
@@ -21,14 +17,15 @@ from typing import Any, NamedTuple
 import psutil
 
 from benchmarks.scaling.model import Shape
-from benchmarks.serving import SERVE, Client, phases_of, serving_process
+from benchmarks.serving import Client, phases_of, serving_process
+from tests.support.cluster import running_cluster
 
 MIX = ((0.5, "path", 20_000), (0.3, "distances", 10_000), (0.2, "distances", 40_000))
 """Shares of questions, their kinds, and the faces of their meshes; all of them are small work"""
 CLIENTS = 48
 """Connections, more than ever are in use"""
-HOST = "127.0.0.2"
-"""Where the head of a cluster on this machine listens: 127.0.0.1 Ray would replace"""
+PORT = 6394
+"""Of the head of a cluster on this machine"""
 
 
 SECRET = "a-key-of-benchmarks-only"  # noqa: S105 - of no other use
@@ -199,41 +196,10 @@ def one_machine(workers: int) -> Iterator[Nodes]:
 def cluster(nodes: int) -> Iterator[Nodes]:
     """Run a replica, and nodes of one worker each, that Ray connects."""
     with ExitStack() as stack:
-        folder = stack.enter_context(
-            tempfile.TemporaryDirectory(prefix="g", ignore_cleanup_errors=True)
-        )
-        with socket.socket() as probe:
-            probe.bind((HOST, 0))
-            port = str(probe.getsockname()[1])
-        settings = {
-            "GEODESIC_STORE": f"{folder}/store",
-            "GEODESIC_ADDRESS": f"{HOST}:{port}",
-            "GEODESIC_CLUSTER_TOKEN": random.randbytes(16).hex(),  # noqa: S311 - of this run only
-            "GEODESIC_WORKERS": "1",
-            **SETTINGS,
-        }
-        Path(folder, "store").mkdir()
-
-        def start(*command: str) -> int:
-            """Start a command, and wait until it says that it is ready: a replica would give up.
-
-            Returns the id of its process.
-            """
-            process = subprocess.Popen(
-                [sys.executable, "-c", SERVE, *command],
-                env=os.environ | settings,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-            )
-            stack.callback(process.wait)
-            stack.callback(process.terminate)
-            if process.stdout is None or not process.stdout.readline():
-                raise RuntimeError(f"{command[0]} ended before it was ready")
-            return process.pid
-
-        start("head", "--host", HOST, "--port", port, "--dir", f"{folder}/h")
-        hosts = [start("node", "--dir", f"{folder}/n{node}") for node in range(nodes)]
-        served = stack.enter_context(serving_process(**settings, GEODESIC_ENGINE="ray"))
+        store = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        made = stack.enter_context(running_cluster(store, PORT, **SETTINGS))
+        hosts = [made.add_node().process.pid for _ in range(nodes)]
+        served = stack.enter_context(serving_process(**made.settings, **made.of_services))
         yield _ready(f"a replica and nodes of one worker: {nodes}", *served, Shape(nodes, 1), hosts)
 
 

@@ -1,6 +1,7 @@
 """Files for containers: what they say is valid, and what they run exists."""
 
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -25,15 +26,23 @@ VARIABLES = {variable_of(name) for name in Settings.model_fields}
 
 
 def commands() -> Iterator[tuple[str, list[str]]]:
-    """Yield each command of ours, by the place that runs it."""
-    for name, service in COMPOSE["services"].items():
-        if str(service["image"]).startswith("geodesic") and "command" in service:
-            yield f"compose: {name}", service["command"]
+    """Yield each command that the containers run, by its place."""
+    places = {
+        f"compose: {name}": [*service.get("entrypoint", []), *service.get("command", [])]
+        for name, service in COMPOSE["services"].items()
+        if str(service["image"]).startswith("geodesic") and "command" in service
+    }
     for document in KUBERNETES:
         for container in containers(document):
-            yield f"kubernetes: {container['name']}", container["args"]
+            places[f"kubernetes: {container['name']}"] = container["command"] + container["args"]
     (words,) = re.findall(r"^CMD (\[.*\])$", (DOCKER / "Dockerfile").read_text(), re.MULTILINE)
-    yield "Dockerfile", yaml.safe_load(words)
+    places["Dockerfile"] = ["geodesic", *yaml.safe_load(words)]
+    for place, words in places.items():
+        if words[0] == "sh":
+            for number, line in enumerate(words[2].split("&&")):
+                yield f"{place}, {number}", shlex.split(line.strip().removeprefix("exec "))
+        else:
+            yield place, words
 
 
 def containers(document: dict[str, Any]) -> list[dict[str, Any]]:
@@ -62,11 +71,15 @@ def test_pods_get_no_variables_of_services() -> None:
     assert [pod.get("enableServiceLinks") for pod in pods] == [False, False, False]
 
 
-@pytest.mark.parametrize("arguments", list(dict(commands()).values()), ids=dict(commands()))
-def test_commands_are_those_of_the_command_line(arguments: list[str]) -> None:
-    name, *options = arguments
-    command = get_command(cli).commands[name]  # type: ignore[attr-defined]
-    command.make_context(name, options)
+@pytest.mark.parametrize("words", list(dict(commands()).values()), ids=dict(commands()))
+def test_commands_are_those_of_the_command_lines(words: list[str]) -> None:
+    program, name, *options = words
+    if program == "ray":
+        ray = pytest.importorskip("ray.scripts.scripts")
+        ray.cli.commands[name].make_context(name, options)
+    else:
+        command = get_command(cli).commands[name]  # type: ignore[attr-defined]
+        command.make_context(name, options)
 
 
 def test_variables_are_those_of_the_settings() -> None:

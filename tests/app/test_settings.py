@@ -17,15 +17,12 @@ TEXTS = {
     "store": ("/somewhere", Path("/somewhere")),
     "copies": ("/elsewhere", Path("/elsewhere")),
     "state": ("postgresql://a:b@c/d", SecretStr("postgresql://a:b@c/d")),
-    "redis": ("redis://a:b@c", SecretStr("redis://a:b@c")),
     "worker_memory_bytes": ("3000000000", 3_000_000_000),
     "deadline_s": ("0.5", 0.5),
     "cancel_grace_s": ("0.25", 0.25),
     "store_evict": ("lru", "lru"),
     "auth": ("on", "on"),
     "engine": ("ray", "ray"),
-    "address": ("10.0.0.1:6379", "10.0.0.1:6379"),
-    "cluster_token": ("a long secret of ours", SecretStr("a long secret of ours")),
     "root_path": ("/geodesic", "/geodesic"),
     "log_format": ("json", "json"),
     "log_probes": ("on", "on"),
@@ -45,17 +42,6 @@ def test_every_setting_is_an_environment_variable(monkeypatch: pytest.MonkeyPatc
     settings = Settings()
 
     assert settings.model_dump() == {name: value for name, (_, value) in given.items()}
-
-
-def test_an_engine_of_several_machines_needs_an_address(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("GEODESIC_ENGINE", "ray")
-
-    with pytest.raises(ValidationError, match="set GEODESIC_ADDRESS to the address of the head"):
-        Settings()
-
-
-def test_the_token_of_a_cluster_is_never_shown() -> None:
-    assert "a long secret" not in repr(Settings(cluster_token=SecretStr("a long secret of ours")))
 
 
 @pytest.mark.parametrize(

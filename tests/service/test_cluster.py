@@ -1,6 +1,6 @@
 """Conformance: the engine of one machine and that of a cluster go through the same cases.
 
-The cluster is real: a head, two nodes and a replica, each a process of its own with Ray's below.
+The cluster is real: a head, two nodes and a service, each a process of its own with Ray's below.
 """
 
 import json
@@ -8,7 +8,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -18,8 +17,8 @@ from typing import Any
 
 import pytest
 
-from tests.support.cluster import HOST, Command, ProcessCluster, kill_at_once, running_cluster
-from tests.support.processes import Server, is_running, stopped, total_time
+from tests.support.cluster import Node, ProcessCluster, running_cluster
+from tests.support.processes import COMMAND_LINE, Server, is_running, stopped, total_time
 from tests.support.service import check_problem, upload_sample
 from tests.support.waiting import wait_until
 
@@ -29,6 +28,8 @@ pytestmark = [
     pytest.mark.skipif(find_spec("ray") is None, reason="needs the extra cluster"),
 ]
 
+PORT = 6391
+"""Of the head"""
 ASYNC = {"Prefer": "respond-async"}
 CANCELLED, LOST = "geodesic_cancellations_total", "geodesic_workers_lost_total"
 IDLE, BUSY = 'geodesic_workers{state="idle"}', 'geodesic_workers{state="busy"}'
@@ -94,7 +95,7 @@ def local(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
 
 @pytest.fixture(scope="module")
 def spread(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
-    with running_cluster(tmp_path_factory.mktemp("shared")) as cluster:
+    with running_cluster(tmp_path_factory.mktemp("shared"), PORT) as cluster:
         cluster.add_node()
         cluster.add_node()
         place = Place(cluster.serve(), cluster)
@@ -223,7 +224,7 @@ def test_a_killed_worker_is_an_error_and_is_replaced(place: Place, mesh_id: str)
 # Of the cluster alone
 
 
-def node_of(cluster: ProcessCluster, worker: int) -> Command:
+def node_of(cluster: ProcessCluster, worker: int) -> Node:
     (node,) = (node for node in cluster.living() if worker in node.workers())
     return node
 
@@ -247,7 +248,7 @@ def begin(spread: Place, **members: Any) -> tuple[str, int]:
     return job, spread.wait_for_busy_worker(before)
 
 
-def test_work_of_a_killed_host_is_done_by_another(spread: Place, cluster: ProcessCluster) -> None:
+def test_work_of_a_killed_node_is_done_by_another(spread: Place, cluster: ProcessCluster) -> None:
     job, worker = begin(spread, max_distance=5.0)
     node_of(cluster, worker).kill()
 
@@ -256,104 +257,62 @@ def test_work_of_a_killed_host_is_done_by_another(spread: Place, cluster: Proces
 
 def test_a_host_process_that_dies_is_started_anew(spread: Place, cluster: ProcessCluster) -> None:
     job, worker = begin(spread, max_distance=4.5)
-    host = next(
-        process
-        for process in node_of(cluster, worker).tree()
-        if "HostActor" in process.name() or "ray::HostActor" in " ".join(process.cmdline())
-    )
-    host.kill()
+    node_of(cluster, worker).named("ServeReplica:geodesic:host").kill()
 
     wait_until(lambda: spread.job(job)["status"] == "successful")
     wait_until(lambda: spread.server.metric(IDLE) == 4)
 
 
-def test_a_node_ends_its_work_before_it_ends(spread: Place, cluster: ProcessCluster) -> None:
-    job, worker = begin(spread, max_distance=4.0)
-    node, lost = node_of(cluster, worker), spread.server.metric(LOST)
+def test_work_of_a_node_that_hangs_is_done_by_another(
+    spread: Place, cluster: ProcessCluster
+) -> None:
+    job, worker = begin(spread, max_distance=4.2)
+    node = node_of(cluster, worker)
+    with stopped(each.pid for each in node.tree()):
+        wait_until(lambda: spread.job(job)["status"] == "successful")
+        # A host that says nothing gets no more work, even before Ray has dropped it.
+        mesh_id = upload_sample(spread.client, "terrain", 3000)
+        for vertex in range(1, 5):
+            path = f"/v1/meshes/{mesh_id}/path?from=v0&to=v{vertex}"
+            assert spread.client.get(path).status_code == 200
+    node.kill()
 
-    assert node.end() == 0
-    assert "draining" in node.said
-    wait_until(lambda: spread.job(job)["status"] == "successful")
-    assert spread.server.metric(LOST) <= lost
 
-
-def test_a_head_that_is_killed_stops_nothing_and_comes_back(spread: Place) -> None:
-    cluster = spread.cluster
-    assert cluster is not None
-    cluster.head.kill()
+def test_a_head_that_is_killed_stops_nothing_and_comes_back(
+    spread: Place, cluster: ProcessCluster
+) -> None:
+    head = cluster.kill_head()
     mesh_id = upload_sample(spread.client, "terrain", 3000)
     assert spread.client.get(f"/v1/meshes/{mesh_id}/path?from=v0&to=v99").status_code == 200
-    replica = spread.server.process.pid
-    since, before = time.monotonic_ns(), total_time([replica])
-    time.sleep(3)
-    taken, passed = total_time([replica]) - before, time.monotonic_ns() - since
-    assert taken < passed / 5, "waiting for the head keeps no core busy"
+    cluster.start_head_again(head)
 
-    cluster.head = cluster.start_head()
-    if len(cluster.living()) == 2:
-        cluster.nodes[-1].end()
+    cluster.living()[0].kill()
     cluster.add_node()  # it finds the new head
     wait_until(lambda: spread.server.metric(IDLE) == 4)
 
 
-def test_work_of_a_killed_replica_ends(spread: Place, cluster: ProcessCluster) -> None:
+def test_work_of_a_killed_service_ends(spread: Place, cluster: ProcessCluster) -> None:
     mesh_id = upload_sample(spread.client, "sphere", 200_000)
     before = spread.times()
     body = json.dumps(spread.long_query(sweeps=400)).encode()
     with spread.server.connect(f"/v1/meshes/{mesh_id}/matrix", body):
         spread.wait_for_busy_worker(before)
-        kill_at_once(spread.server.process)
+        spread.server.kill()
 
     spread.server = cluster.serve()
     wait_until(lambda: spread.server.metric(CANCELLED) >= 1)
     wait_until(lambda: spread.server.metric(IDLE) == 4)
 
 
-@pytest.mark.parametrize(
-    ("settings", "says"),
-    [
-        ({"GEODESIC_CLUSTER_TOKEN": "another-token-of-tests"}, "has another token"),
-        ({"GEODESIC_ADDRESS": f"{HOST}:1"}, f"no head answers at {HOST}:1"),
-        ({"GEODESIC_ADDRESS": "nonsense"}, "'nonsense' is not the address of a head"),
-        ({"GEODESIC_ADDRESS": "127.0.0.1:6379"}, "Ray takes 127.0.0.1 to mean any address"),
-        ({"GEODESIC_STORE": "/nowhere"}, "there is no store at /nowhere"),
-    ],
-)
-def test_a_node_says_why_it_cannot_join(
-    cluster: ProcessCluster, settings: dict[str, str], says: str
+def test_a_service_says_that_its_machine_is_in_no_cluster(
+    cluster: ProcessCluster, tmp_path: Path
 ) -> None:
-    node = cluster.run("node", "--dir", str(cluster.folder / "x"), **settings)
-
-    assert node.process.wait() == 1
-    assert node.said.startswith("error: ")
-    assert says in node.said
-    assert node.said.count("\n") == 1
-
-
-def test_the_status_tells_each_host_and_its_load(spread: Place, cluster: ProcessCluster) -> None:
-    spread.wait_until_idle()
-    asked = cluster.run("cluster", "status", "--json")
-    assert asked.process.wait() == 0, asked.said
-    told = json.loads(asked.said)
-    assert told["address"] == cluster.settings["GEODESIC_ADDRESS"]
-    assert len(told["hosts"]) == len(cluster.living())
-    for host in told["hosts"].values():
-        assert (host["workers"], host["is_ready"], host["is_draining"]) == (1, True, False)
-
-    asked = cluster.run("cluster", "status")
-    assert asked.process.wait() == 0
-    assert asked.said.count("ready, 0 of 1 workers busy, 0 tasks waiting") == len(told["hosts"])
-
-
-def test_the_status_says_why_it_has_none(cluster: ProcessCluster) -> None:
-    asked = cluster.run("cluster", "status", GEODESIC_ADDRESS=f"{HOST}:1")
-    assert asked.process.wait() == 1
-    assert f"no head answers at {HOST}:1" in asked.said
-
-
-def test_a_second_head_at_the_same_address_is_refused(cluster: ProcessCluster) -> None:
-    port = str(cluster.port)
-    head = cluster.run("head", "--host", HOST, "--port", port, "--dir", str(cluster.folder / "y"))
-
-    assert head.process.wait() == 1
-    assert f"the head cannot listen at {HOST}:{port}: Address already in use" in head.said
+    ran = subprocess.run(  # noqa: S603 - this Python
+        [*COMMAND_LINE, "serve", "--engine", "ray", "--port", "0", "--store", str(tmp_path)],
+        env=os.environ | cluster.settings | {"RAY_ADDRESS": "127.0.0.2:1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ran.returncode == 1
+    assert "this machine is in no cluster" in ran.stderr.splitlines()[-1]

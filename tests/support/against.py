@@ -22,6 +22,8 @@ from tests.support.processes import Server
 from tests.support.s3 import S3
 from tests.support.waiting import LONG_S, wait_until
 
+PORT = 6392
+"""Of the head"""
 SERVICE, CLUSTER = "service", "cluster"
 NODES = 2
 IN_THIS_PROCESS = ("monkeypatch", "sweeps")
@@ -114,20 +116,16 @@ def serving_cluster(
     s3: S3, store: str, state: str, folder: Path, **settings: Any
 ) -> Iterator[ClusterClient]:
     """Run two replicas and two nodes inside the block, on URLs of a store and of a database."""
-    with running_cluster(folder / "unused") as cluster:
-        shared = {"store": store, "state": state, "engine": "ray"} | settings
+    with running_cluster(store, PORT) as cluster:
+        shared = {"store": store, "state": state} | settings
         cluster.settings |= {f"GEODESIC_{key.upper()}": str(shared[key]) for key in shared}
         cluster.settings |= s3.environment
-        for name in ("one", "two"):
-            own = cluster.settings | {"GEODESIC_COPIES": str(folder / name)}
-            log = folder / f"{name}.log"
-            server = Server(store, waits_for_workers=False, log=log, **own)  # type: ignore[arg-type]
-            cluster.servers.append(server)
         for _ in range(NODES):
             cluster.add_node()
+        for name in ("one", "two"):
+            cluster.serve(log=folder / f"{name}.log", GEODESIC_COPIES=str(folder / name))
         with ClusterClient(cluster) as client:
             client.wait_until_idle()
-            wait_until(cluster.servers[1].is_ready)
             yield client
 
 

@@ -1,6 +1,7 @@
 """A whole deployment, each part on a machine of its own: head, nodes, replicas, S3, PostgreSQL."""
 
 import re
+import shlex
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -10,11 +11,11 @@ from pathlib import Path
 
 import httpx2
 
-from tests.support.cluster import TOKEN
+from tests.support.cluster import OPTIONS, RAY_START, TOKEN, variables_of_ray
 from tests.support.machines import Machine, Network, network
 from tests.support.postgres import Server as Postgres
 from tests.support.postgres import running_postgres
-from tests.support.processes import workers_of
+from tests.support.processes import COMMAND_LINE, workers_of
 from tests.support.s3 import S3
 from tests.support.waiting import LONG_S, wait_until
 
@@ -23,7 +24,7 @@ HEAD_PORT, PORT = 6379, 8000
 
 @dataclass(eq=False)
 class Part:
-    """A command of ``geodesic``, and the machine that runs it."""
+    """A command, and the machine that runs it."""
 
     machine: Machine
     arguments: Sequence[str]
@@ -101,16 +102,18 @@ class Deployment:
         self.settings = {
             "GEODESIC_STORE": self.s3.new_url(),
             "GEODESIC_STATE": self.postgres.new_database(),
-            "GEODESIC_ADDRESS": f"{head.address}:{HEAD_PORT}",
-            "GEODESIC_CLUSTER_TOKEN": TOKEN,
+            **variables_of_ray(),
+            "RAY_AUTH_TOKEN": TOKEN,
             "GEODESIC_WORKERS": "1",
             **self.s3.environment,
             **settings,
         }
-        listen = ["--host", head.address, "--port", str(HEAD_PORT)]
-        self.head = self._part(head, "h", ["head", *listen, "--dir", str(folder / "h")])
+        self._address = f"{head.address}:{HEAD_PORT}"
+        records = {"RAY_gcs_storage": "rocksdb", "RAY_gcs_storage_path": str(folder / "records")}
+        head_options = ["--head", f"--port={HEAD_PORT}", "--include-dashboard=false"]
+        self.head = Part(*self._ray(head, "h", head_options, records))
         self.nodes = [
-            self._part(node, name, ["node", "--dir", str(folder / name)])
+            Part(*self._ray(node, name, [*self._joining, "--resources", '{"geodesic": 1}'], {}))
             for name, node in zip(("n1", "n2"), nodes, strict=True)
         ]
         self.replicas = [
@@ -118,13 +121,26 @@ class Deployment:
             for name, replica in zip(("r1", "r2"), replicas, strict=True)
         ]
 
-    def _part(self, machine: Machine, name: str, arguments: Sequence[str]) -> Part:
-        return Part(machine, arguments, self.settings, self.folder / f"{name}.log")
+    @property
+    def _joining(self) -> Sequence[str]:
+        return [f"--address={self._address}"]
+
+    def _ray(
+        self, machine: Machine, name: str, options: Sequence[str], settings: Mapping[str, str]
+    ) -> tuple[Machine, Sequence[str], Mapping[str, str], Path]:
+        folder = self.folder / name
+        own = {"GEODESIC_COPIES": str(folder / "copies"), **settings}
+        at = [f"--node-ip-address={machine.address}", f"--temp-dir={folder}"]
+        command = [*RAY_START, *OPTIONS, *options, *at]
+        return machine, command, self.settings | own, self.folder / f"{name}.log"
 
     def _replica(self, name: str, machine: Machine) -> Replica:
-        arguments = ["serve", "--host", machine.address, "--port", str(PORT)]
-        own = {"GEODESIC_ENGINE": "ray", "GEODESIC_COPIES": str(self.folder / f"{name}-copies")}
-        return Replica(machine, arguments, self.settings | own, self.folder / f"{name}.log")
+        """Return a service, and Ray beside it on its machine."""
+        _, ray, settings, log = self._ray(machine, name, self._joining, {})
+        serve = [*COMMAND_LINE, "serve", "--host", machine.address, "--port", str(PORT)]
+        both = f"{shlex.join(ray)} & sleep 5; exec {shlex.join(serve)}"
+        own = {"GEODESIC_ENGINE": "ray", "RAY_ADDRESS": self._address}
+        return Replica(machine, ["sh", "-c", both], {**settings, **own}, log)
 
     @property
     def parts(self) -> Sequence[Part]:
@@ -133,7 +149,7 @@ class Deployment:
     def start(self) -> None:
         """Start all parts; a replica makes the store, which nodes need."""
         self.head.start()
-        self._wait_for(lambda: b"the head listens" in self.head.log.read_bytes())
+        self._wait_for(lambda: b"Ray runtime started" in self.head.log.read_bytes())
         for replica in self.replicas:
             replica.start()
         self._wait_for(lambda: all(replica.listens() for replica in self.replicas))

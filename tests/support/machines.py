@@ -15,7 +15,6 @@ from pathlib import Path
 import psutil
 
 from tests.support.paths import ROOT
-from tests.support.processes import COMMAND_LINE
 
 OURS = 1
 """The last byte of our own address in a network; those of machines follow"""
@@ -64,10 +63,10 @@ class Machine:
     def run(
         self, arguments: Sequence[str], log: Path, settings: Mapping[str, str]
     ) -> "subprocess.Popen[bytes]":
-        """Start a command of ``geodesic`` there."""
+        """Start a command there."""
         with log.open("ab") as output:
-            return subprocess.Popen(  # noqa: S603 - this Python
-                [*self.inside, *COMMAND_LINE, *arguments],
+            return subprocess.Popen(  # noqa: S603 - ours
+                [*self.inside, *arguments],
                 env=os.environ | settings,
                 cwd=ROOT,
                 stdout=output,

@@ -44,7 +44,7 @@ def run(test: Callable[[SingleFlight[int], Work], object]) -> None:
         flights: SingleFlight[int] = SingleFlight()
         await test(flights, Work())  # type: ignore[misc]
         await asyncio.sleep(0)
-        assert "name" not in flights.under_way(), "what is over is forgotten"
+        assert "name" not in flights.names(), "what is over is forgotten"
 
     asyncio.run(main())
 
@@ -52,7 +52,7 @@ def run(test: Callable[[SingleFlight[int], Work], object]) -> None:
 def test_all_calls_share_one_computation() -> None:
     async def test(flights: SingleFlight[int], work: Work) -> None:
         waiting = [await joined(flights, work) for _ in range(5)]
-        assert "name" in flights.under_way()
+        assert "name" in flights.names()
         work.end.set_result(7)
 
         assert await asyncio.gather(*waiting) == [7] * 5
