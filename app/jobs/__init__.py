@@ -3,5 +3,16 @@
 from app.jobs.job import Job, JobSpec
 from app.jobs.manager import JobManager
 from app.jobs.repository import JobRepository, read_jobs, read_shared_jobs
+from app.jobs.retention import Retention
+from app.jobs.runner import JobRunner
 
-__all__ = ["Job", "JobManager", "JobRepository", "JobSpec", "read_jobs", "read_shared_jobs"]
+__all__ = [
+    "Job",
+    "JobManager",
+    "JobRepository",
+    "JobRunner",
+    "JobSpec",
+    "Retention",
+    "read_jobs",
+    "read_shared_jobs",
+]

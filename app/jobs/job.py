@@ -9,9 +9,6 @@ from pydantic import AliasChoices, BaseModel, ConfigDict, Field
 from app.errors import Problem
 from app.schemas.service import JobStatus
 
-_STATES_OF_RUN = 100_000
-"""More states than a run of a job has: its progress has four digits"""
-
 
 class JobSpec(BaseModel):
     """What a job is to do, but for its query, and its owner."""
@@ -51,8 +48,6 @@ class Job(BaseModel):
     """Stored as ``errand``, its name in this layout of the store"""
     status: JobStatus = "accepted"
     progress: float = 0.0
-    replica: str | None = None
-    """Id of the service that runs the job, where several share their state"""
     version: int = 1
     """Greater than that of each state before"""
     runs: int = 0
@@ -66,11 +61,6 @@ class Job(BaseModel):
     """Name of the answer in the result store"""
 
     @property
-    def owner(self) -> str | None:
-        """The owner, as of an `EndedJob`."""
-        return self.spec.owner
-
-    @property
     def is_finished(self) -> bool:
         """Whether this is the last state."""
         return self.finished is not None
@@ -82,20 +72,9 @@ class Job(BaseModel):
             return self._next(status="running", progress=progress, **begun)
         return self._next(progress=progress)
 
-    def accepted_again(self, replica: str | None = None) -> "Job":
-        """Return the state of a job that was under way when the service ended.
-
-        ``replica`` is the id of the one that runs it from now on.
-        """
-        again = {"status": "accepted", "progress": 0.0, "started": None, "replica": replica}
-        return self.beyond_run().model_copy(update=again)
-
-    def beyond_run(self) -> "Job":
-        """Return the stored state of a job, later than those that are not stored.
-
-        Another service may have shown those to clients.
-        """
-        return self.model_copy(update={"version": self.version + _STATES_OF_RUN})
+    def accepted_again(self) -> "Job":
+        """Return the state of a job that was under way when the service ended."""
+        return self._next(status="accepted", progress=0.0, started=None)
 
     def successful(self, result: str) -> "Job":
         """Return the state of a job with a result."""
@@ -124,6 +103,12 @@ class EndedJob(NamedTuple):
     result: str | None
     """Name of its answer in the result store"""
     finished: datetime
+
+    @classmethod
+    def of(cls, job: Job) -> "EndedJob":
+        """Return that of a job which has finished."""
+        assert job.finished is not None, "it has finished"  # noqa: S101
+        return cls(job.id, job.spec.owner, job.result, job.finished)
 
 
 def _now_after(earlier: datetime) -> datetime:

@@ -1,6 +1,6 @@
 """The records of jobs, in a database: they outlive the process that wrote them."""
 
-from collections.abc import AsyncIterator, Iterable, Sequence
+from collections.abc import AsyncIterator, Iterable
 from contextlib import asynccontextmanager
 from datetime import datetime
 from pathlib import Path
@@ -10,9 +10,6 @@ from app.jobs.job import EndedJob, Job
 from app.state import Database, Statements, read_database, read_shared_database
 
 _RECORD = "CAST(record AS TEXT)"
-
-_IDS_AT_ONCE = 500
-"""Ids of one statement: databases accept some thousands, and each keeps others waiting"""
 
 
 class JobRecords:
@@ -38,18 +35,17 @@ class JobRecords:
             await self._forget_query(job.id)
             raise
 
-    async def update(self, job: Job, holder: str | None) -> bool:
-        """Replace the record of a job that has not finished, and that ``holder`` runs.
+    async def update(self, job: Job, version: int) -> bool:
+        """Replace the record of a job that has not finished, and that still has a ``version``.
 
-        Its query is removed once its end is recorded. False means that there is no such job any
-        more.
+        Its query is removed once its end is recorded. False means that another process was faster.
         """
         changed = await self._statements.run_on_reserve(
             "UPDATE jobs SET record = ? WHERE id = ? AND finished IS NULL "
-            "AND COALESCE(record ->> 'replica', '') = ?",
+            "AND CAST(record ->> 'version' AS TEXT) = ?",
             job.model_dump_json(),
             job.id,
-            holder or "",
+            str(version),
         )
         if job.is_finished:
             await self._forget_query(job.id)
@@ -98,38 +94,32 @@ class JobRecords:
         ((count,),) = await self._statements.rows(statement, owner or "")
         return int(count)
 
-    async def count_finished(self) -> dict[str, int]:
-        """Return the number of finished jobs by status."""
-        statement = "SELECT status, COUNT(*) FROM jobs WHERE finished IS NOT NULL GROUP BY status"
-        return dict(await self._statements.rows(statement))
+    async def count_by_status(self) -> dict[str, int]:
+        """Return the number of jobs of all owners by status."""
+        return dict(
+            await self._statements.rows("SELECT status, COUNT(*) FROM jobs GROUP BY status")
+        )
 
-    async def unfinished(self) -> list[Job]:
-        """Return the jobs that have not finished, the oldest first."""
-        return await self._jobs("WHERE finished IS NULL ORDER BY number")
+    async def unfinished(self) -> list[str]:
+        """Return the ids of the jobs that have not finished, the oldest first."""
+        rows = await self._statements.rows(
+            "SELECT id FROM jobs WHERE finished IS NULL ORDER BY number"
+        )
+        return [job_id for (job_id,) in rows]
 
-    async def added(self, after: int) -> tuple[set[str], int]:
-        """Return the ids of the jobs added after that with a number, and the newest number."""
-        rows = await self._statements.rows("SELECT id, number FROM jobs WHERE number > ?", after)
-        return {job_id for job_id, _ in rows}, max((number for _, number in rows), default=after)
+    async def load(self, job_id: str) -> Job | None:
+        """Return a job, whoever owns it; None where there is none."""
+        jobs = await self._jobs("WHERE id = ?", job_id)
+        return jobs[0] if jobs else None
 
-    async def finished(self) -> set[str]:
-        """Return the ids of the jobs that have finished."""
-        rows = await self._statements.rows("SELECT id FROM jobs WHERE finished IS NOT NULL")
-        return {job_id for (job_id,) in rows}
-
-    async def ended(self, ids: Sequence[str]) -> list[EndedJob]:
-        """Return those of some jobs that have finished."""
-        found: list[Any] = []
-        for start in range(0, len(ids), _IDS_AT_ONCE):
-            some = ids[start : start + _IDS_AT_ONCE]
-            found += await self._statements.rows(
-                "SELECT id, owner, record ->> 'result', finished FROM jobs "  # noqa: S608 - no value
-                f"WHERE finished IS NOT NULL AND id IN ({', '.join('?' * len(some))})",
-                *some,
-            )
+    async def ended(self) -> list[EndedJob]:
+        """Return the jobs that have finished."""
+        rows = await self._statements.rows(
+            "SELECT id, owner, record ->> 'result', finished FROM jobs WHERE finished IS NOT NULL"
+        )
         return [
             EndedJob(job_id, owner, result, datetime.fromisoformat(finished))
-            for job_id, owner, result, finished in found
+            for job_id, owner, result, finished in rows
         ]
 
     async def _forget_query(self, job_id: str) -> None:

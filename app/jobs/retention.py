@@ -1,67 +1,68 @@
-"""Retention of finished jobs: when each is to be removed.
+"""Retention of finished jobs: each keeps its answer in the store until it is removed.
 
 Clocks may be moved by years, by a time server or a person. So the calendar says only how old jobs
-are when the service starts; from then on a clock counts that nobody can set.
+are when they are first seen; from then on a clock counts that nobody can set.
 """
 
+from collections.abc import Iterable
 from datetime import UTC, datetime
 from math import ceil
 from time import monotonic
 from typing import NamedTuple
 
-from app.jobs.job import EndedJob, Job
+from app.jobs.job import EndedJob
+from app.store.results import ResultStore
 
 
-class FinishedJob(NamedTuple):
-    """A finished job, as far as its removal needs it."""
-
-    id: str
+class _FinishedJob(NamedTuple):
     owner: str | None
     result: str | None
-    """Name of its answer in the result store"""
     due: float
     """Time of its removal, in seconds of `monotonic`"""
 
 
 class Retention:
-    """The finished jobs of a service, each for ``ttl_s`` seconds after its end."""
+    """The finished jobs that this process knows, each for ``ttl_s`` seconds after its end.
 
-    def __init__(self, ttl_s: float) -> None:
+    Their answers are pinned in ``results``.
+    """
+
+    def __init__(self, results: ResultStore, ttl_s: float) -> None:
+        self._results = results
         self._ttl_s = ttl_s
-        self._finished: dict[str, FinishedJob] = {}
+        self._finished: dict[str, _FinishedJob] = {}
 
-    def add(self, job: Job) -> None:
-        """Add a job that has finished just now."""
-        self._add(job.id, job.spec.owner, job.result, age_s=0.0)
+    def keep_up(self, jobs: Iterable[EndedJob]) -> None:
+        """Note which jobs have finished and still are there."""
+        found = {job.id: job for job in jobs}
+        for job_id in self._finished.keys() - found.keys():
+            self.discard(job_id)
+        for job in found.values():
+            self.add(job)
 
-    def add_older(self, job: EndedJob) -> None:
-        """Add a job that finished before the service started, or at another replica.
+    def add(self, job: EndedJob) -> None:
+        """Note a job that has finished.
 
         By the calendar its end may be to come: then its age is none.
         """
+        if job.id in self._finished:
+            return
         age_s = max(0.0, (datetime.now(UTC) - job.finished).total_seconds())
-        self._add(job.id, job.owner, job.result, age_s)
-
-    def _add(self, job_id: str, owner: str | None, result: str | None, age_s: float) -> None:
         due = monotonic() + self._ttl_s - age_s
-        self._finished[job_id] = FinishedJob(job_id, owner, result, due)
+        self._finished[job.id] = _FinishedJob(job.owner, job.result, due)
+        if job.result is not None:
+            self._results.pin(job.result, job.owner)
 
-    def __contains__(self, job_id: str) -> bool:
-        return job_id in self._finished
+    def discard(self, job_id: str) -> None:
+        """Forget a job that has been removed."""
+        job = self._finished.pop(job_id, None)
+        if job is not None and job.result is not None:
+            self._results.unpin(job.result, job.owner)
 
-    @property
-    def jobs(self) -> list[FinishedJob]:
-        """All jobs."""
-        return list(self._finished.values())
-
-    def discard(self, job_id: str) -> bool:
-        """Forget a job that has been removed; tell whether it was there."""
-        return self._finished.pop(job_id, None) is not None
-
-    def due(self) -> list[FinishedJob]:
-        """Return the jobs that are to be removed by now."""
+    def due(self) -> list[str]:
+        """Return the ids of the jobs that are to be removed by now."""
         now = monotonic()
-        return [job for job in self._finished.values() if job.due <= now]
+        return [job_id for job_id, job in self._finished.items() if job.due <= now]
 
     def seconds_to_first(self, owner: str | None) -> int | None:
         """Return the seconds until a job of an owner is removed; None where none has finished."""

@@ -52,13 +52,10 @@ class ConcurrencyLimit:
         if self._limit is None:
             yield
             return
-        running = await allowances.begin(self._setting, caller.name, self._limit)
-        if running > self._limit:
-            raise self._refusal(running, self._limit)
-        try:
+        async with allowances.counting(self._setting, caller.name, self._limit) as running:
+            if running > self._limit:
+                raise self._refusal(running, self._limit)
             yield
-        finally:
-            await allowances.end(self._setting, caller.name)
 
     def _refusal(self, running: int, limit: int) -> ProblemError:
         what, headers = f"{self._what} at the same time", {"Retry-After": "1"}

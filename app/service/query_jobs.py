@@ -2,7 +2,6 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable
-from functools import partial
 from typing import Any
 
 import structlog
@@ -14,7 +13,7 @@ from app.errors import ProblemError, problem, problem_of
 from app.jobs import Job, JobManager, JobSpec
 from app.queries import KINDS, MatrixQuery, MeshSize, Query, fingerprint
 from app.service.answering import Answered, Answering
-from app.service.progress import LatestProgress
+from app.service.progress import ignore_progress
 from app.service.request_context import RequestContext
 from app.service.time_limit import time_limit
 from app.settings import Settings
@@ -28,18 +27,6 @@ _STORE_PAUSE_S = 1.0
 
 SizeOf = Callable[[str], Awaitable[MeshSize]]
 """Returns the size of a mesh, by its id"""
-
-
-class _Begun:
-    """An answer that is under way, for whoever takes it first."""
-
-    def __init__(self, answering: "asyncio.Task[Answered]") -> None:
-        self._answering: asyncio.Task[Answered] | None = answering
-
-    def take(self) -> "asyncio.Task[Answered] | None":
-        """Return the answer under way; None where it was taken before."""
-        answering, self._answering = self._answering, None
-        return answering
 
 
 class QueryJobs:
@@ -61,6 +48,7 @@ class QueryJobs:
         self._results = results
         self._size_of = size_of
         self._reading = CapacityLimiter(1)
+        self._handing_over: set[asyncio.Task[None]] = set()
 
     async def submit(self, query: Query[Any], context: RequestContext, key: str | None) -> Job:
         """Accept a job that answers a query, or return the job with the idempotency key."""
@@ -68,13 +56,7 @@ class QueryJobs:
         self._answering.engine.refuse_when_full(context.caller.name)
         self._results.refuse_without_room(context.caller.owner, self._room(query))
 
-        async def solve(on_progress: ProgressCallback) -> Result:
-            promised = partial(
-                self._promised, query, context.caller.name, context.caller.owner, on_progress
-            )
-            return await self._patiently(promised)
-
-        return await self._jobs.submit(_spec_of(query, context, key), query.written, solve)
+        return await self._jobs.submit(_spec_of(query, context, key), query.written)
 
     async def answer_or_submit(
         self,
@@ -87,57 +69,48 @@ class QueryJobs:
     ) -> Answered | Job:
         """Answer a query, by a job if that takes longer than the wait.
 
-        The job goes on with the work that was begun.
+        The job joins the work that was begun.
         """
         client = context.caller.name
         self._answering.engine.refuse_when_full(client)
-        progress = LatestProgress()
         answering = asyncio.create_task(
-            self._answering.find_or_compute(query, client, progress, is_promised=True)
+            self._answering.find_or_compute(query, client, ignore_progress, is_promised=True)
         )
-        begun = _Begun(answering)
-
-        async def attempt() -> Result:
-            first = begun.take()
-            if first is None:
-                return await self._promised(query, client, context.caller.owner, progress)
-            result, _ = await first
-            return await self._results.with_files(result)
-
-        async def solve(on_progress: ProgressCallback) -> Result:
-            progress.follow(on_progress)
-            return await self._patiently(attempt)
-
         try:
             await asyncio.wait({answering}, timeout=min(wait_s, context.deadline_s))
             if not answering.done():
                 self._results.refuse_without_room(context.caller.owner, self._room(query))
-                spec = _spec_of(query, context, key)
-                job = await self._jobs.submit(spec, query.written, solve)
-                if job.spec is not spec:  # an earlier one with the same idempotency key
-                    self._abandon(begun)
+                job = await self._jobs.submit(_spec_of(query, context, key), query.written)
+                handing_over = asyncio.create_task(self._hand_over(answering, job))
+                self._handing_over.add(handing_over)
+                handing_over.add_done_callback(self._handing_over.discard)
                 return job
         except BaseException:
-            self._abandon(begun)
+            self._abandon(answering)
             raise
         result, seconds = answering.result()
         return await self._results.with_files(result) if as_file else result, seconds
 
-    def _abandon(self, begun: _Begun) -> None:
-        """Stop an answer that nobody will send, unless a job has taken it."""
-        answering = begun.take()
-        if answering is not None:
-            answering.cancel()
-            answering.add_done_callback(self._release)
+    async def _hand_over(self, answering: "asyncio.Task[Answered]", job: Job) -> None:
+        """Go on with work until a job has joined it."""
+        try:
+            async for state in self._jobs.watch(job, 0):
+                if state.status != "accepted":
+                    return
+        finally:
+            self._abandon(answering)
+
+    def _abandon(self, answering: "asyncio.Task[Answered]") -> None:
+        """Stop an answer that nobody will send, unless others wait for it as well."""
+        answering.cancel()
+        answering.add_done_callback(self._release)
 
     def _release(self, answered: "asyncio.Task[Answered]") -> None:
         if not answered.cancelled() and answered.exception() is None:
             self._results.release(answered.result()[0])
 
-    async def solve_again(
-        self, spec: JobSpec, written: bytes, on_progress: ProgressCallback
-    ) -> Result:
-        """Compute the answer of a job that was under way when the service ended."""
+    async def solve(self, spec: JobSpec, written: bytes, on_progress: ProgressCallback) -> Result:
+        """Compute the answer of a job."""
         representation = Representation(spec.media_type, spec.dtype, spec.coding)
 
         async def attempt() -> Result:

@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from gc import collect, freeze
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from app.engine.interface import Engine
 from app.engine.supplied import SuppliedEngine
 from app.engine.work import MeshInput, StoreMesh, Task
 from app.errors import ProblemError, problem
-from app.jobs import JobManager, JobRepository
+from app.jobs import JobManager, JobRepository, JobRunner, Retention
 from app.queries import MeshSize
 from app.repeating import repeat
 from app.service.answering import Answering, PhaseSeconds
@@ -28,7 +29,7 @@ from app.service.resources import share_arenas
 from app.service.scrub import scrubbing
 from app.service.time_limit import time_limit
 from app.settings import Settings
-from app.state import Allowances, Database, MeshRecords, Replicas, database_of
+from app.state import Allowances, Database, MeshRecords, database_of
 from app.store import layout
 from app.store.choice import store_of
 from app.store.fields import FieldStore
@@ -41,6 +42,9 @@ from app.store.scratch import Scratch
 
 _CATALOG_PERIOD_S = 2.0
 """Seconds between two looks at what other services did to meshes, where they are shared"""
+
+_JOBS_PERIOD_S = 5.0
+"""Seconds between two looks at what others did to jobs, where another process runs them"""
 
 Manifest = Mapping[str, Any]
 
@@ -57,9 +61,11 @@ class StoredMesh:
 class Service:
     """The parts of a running service, and the use cases that combine them."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, *, runs_jobs: bool = False) -> None:
         self.settings = settings
         self.database = _database_of(settings)
+        self._is_one_of_many = self.database.is_shared and settings.engine == "ray"
+        self._runs_jobs = runs_jobs or not self._is_one_of_many
         self.store = store_of(settings)
         self.scratch = Scratch(settings.folder, settings.scratch_bytes)
         self.mesh_catalog = MeshCatalog(
@@ -79,16 +85,13 @@ class Service:
         self.fields = FieldStore(settings.folder, settings.fields_bytes)
         self.engine = _engine(settings, self.store)
         self.engine.on_unclaimed = self.results.index_unclaimed
-        replicas = Replicas(self.database) if self.database.is_shared else None
-        self.allowances = Allowances(self.database, replicas.id) if replicas else None
-        """What callers have taken, where several services count together"""
-        self.jobs = JobManager(
-            JobRepository(self.database),
-            self.results,
-            settings.job_ttl,
-            settings.quota_jobs,
-            replicas,
+        self.allowances = (
+            Allowances(self.database, settings.deadline_s) if self.database.is_shared else None
         )
+        """What callers have taken, where several services count together"""
+        repository, ttl_s = JobRepository(self.database), settings.job_ttl
+        retention = Retention(self.results, ttl_s)
+        self.jobs = JobManager(repository, self.results, retention, settings.quota_jobs)
         self.answering = Answering(
             settings,
             self.mesh_catalog,
@@ -98,6 +101,9 @@ class Service:
         )
         self.query_jobs = QueryJobs(
             settings, self.answering, self.jobs, self.mesh_catalog, self.results, self.size
+        )
+        self.job_runner = JobRunner(
+            repository, self.results, retention, ttl_s, self.query_jobs.solve, self.jobs.notify
         )
         self._uploads = ConcurrencyLimit(
             settings.quota_uploads, "quota_exceeded", "uploads", "quota_uploads"
@@ -123,7 +129,7 @@ class Service:
                 freeze()
                 try:
                     async with (
-                        self.jobs.running(self.query_jobs.solve_again),
+                        self._running_jobs(),
                         scrubbing(self.settings.folder, self._repair),
                     ):
                         self.results.make_room()  # now it is known which are those of jobs
@@ -131,14 +137,38 @@ class Service:
                 finally:
                     await self.engine.stop()
 
+    @asynccontextmanager
+    async def _running_jobs(self) -> AsyncIterator[None]:
+        """Have jobs run inside the block: here, or by the one process of a cluster that does it."""
+        try:
+            if self._runs_jobs:
+                self.jobs.runner = self.job_runner
+                async with self.job_runner.running():
+                    yield
+            else:
+                from app.service.ray_jobs import RemoteRunner
+
+                service_of = partial(Service, runs_jobs=True)
+                self.jobs.runner = RemoteRunner(service_of, self.settings)
+                await self.jobs.keep_up()
+                keeping_up = repeat(self.jobs.keep_up, _JOBS_PERIOD_S, "jobs not kept up")
+                task = asyncio.create_task(keeping_up)
+                try:
+                    yield
+                finally:
+                    task.cancel()
+                    await asyncio.wait({task})
+        finally:
+            self.jobs.end_events()
+
     @contextmanager
     def owning_store(self) -> Iterator[Share | None]:
-        """Own the store inside the block, or share it where the database is shared.
+        """Own the store inside the block, or share it with the other services of a cluster.
 
         Raises ``StoreError`` where the store is not usable, and ``StateError`` where the database
         is not.
         """
-        with self.store.owned(is_shared=self.database.is_shared) as share:
+        with self.store.owned(is_shared=self._is_one_of_many) as share:
             self.database.prepare()
             self.store.claim(self.database.service)
             yield share
@@ -162,8 +192,6 @@ class Service:
             if following is not None:
                 following.cancel()
                 await asyncio.wait({following})
-            if self.allowances is not None:
-                await self.allowances.close()
             await self.database.close()
 
     def announce_end(self) -> None:

@@ -4,14 +4,12 @@ from app.state.allowances import Allowances
 from app.state.choice import database_of, read_shared_database
 from app.state.database import Database, StateError, Statements
 from app.state.mesh_records import MeshRecords
-from app.state.replicas import Replicas
 from app.state.sqlite import SqliteDatabase, read_database, require_intact
 
 __all__ = [
     "Allowances",
     "Database",
     "MeshRecords",
-    "Replicas",
     "SqliteDatabase",
     "StateError",
     "Statements",

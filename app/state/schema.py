@@ -53,6 +53,18 @@ REVISIONS: Mapping[str, Sequence[str]] = {
         )
         """,
     ),
+    "0002": (
+        "DROP TABLE IF EXISTS replicas",
+        "DROP TABLE IF EXISTS running",
+        """
+        CREATE TABLE IF NOT EXISTS work (
+            id TEXT PRIMARY KEY,
+            kind TEXT NOT NULL,
+            caller TEXT NOT NULL,
+            ends DOUBLE PRECISION NOT NULL
+        )
+        """,
+    ),
 }
 
 SQLITE = {

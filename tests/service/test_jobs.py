@@ -458,7 +458,7 @@ def test_jobs_stay_as_long_as_ever_when_the_clock_is_moved(
     monkeypatch.setattr("app.jobs.retention.monotonic", clock)
     for module in ("job", "retention"):
         monkeypatch.setattr(f"app.jobs.{module}.datetime", calendar)
-    monkeypatch.setattr("app.jobs.manager._TIDY_PERIOD_S", 0.01)
+    monkeypatch.setattr("app.jobs.runner._TIDY_PERIOD_S", 0.01)
     with serving(tmp_path, job_ttl=60) as client:
         mesh_id = upload_sample(client, "plane", 50)
         jobs = [job_of(submit(client, mesh_id))]
@@ -500,22 +500,21 @@ def test_the_end_of_a_job_is_recorded_once_the_disk_can_be_written(
 ) -> None:
     update, is_read_only = JobRepository.update, True
 
-    async def update_later(repository: JobRepository, job: Job, holder: str | None) -> bool:
+    async def update_later(repository: JobRepository, job: Job, version: int) -> bool:
         if is_read_only:
+            refused.append(job.status)
             raise OSError(errno.EROFS, "attempt to write a readonly database")
-        return await update(repository, job, holder)
+        return await update(repository, job, version)
 
+    refused: list[str] = []
     monkeypatch.setattr(JobRepository, "update", update_later)
-    monkeypatch.setattr("app.jobs.manager._TIDY_PERIOD_S", 0.01)
     with serving(tmp_path) as client:
         job = job_of(submit(client, upload_sample(client, "plane", 50)))
-        wait_for(client, job, "successful")
-        assert client.get(f"{job}/results").status_code == 200
+        wait_until(lambda: refused)
         assert {stored.status for stored in read_jobs(tmp_path / "jobs.sqlite3")} == {"accepted"}
         is_read_only = False
-        wait_until(
-            lambda: all(stored.is_finished for stored in read_jobs(tmp_path / "jobs.sqlite3"))
-        )
+        wait_for(client, job, "successful")
+        assert client.get(f"{job}/results").status_code == 200
 
 
 @pytest.fixture

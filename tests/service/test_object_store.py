@@ -4,21 +4,19 @@ import threading
 from base64 import b64encode
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, closing
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import anyio
-import numpy as np
 import pytest
 from structlog.testing import capture_logs
 
 import geodesic_core as gc
-from tests.service.test_replicas import refused_start
 from tests.support.azure import Azure
 from tests.support.gcs import GCS
 from tests.support.postgres import Server as Postgres
-from tests.support.processes import Server, stopped
+from tests.support.processes import refused_start, stopped
 from tests.support.s3 import S3
 from tests.support.service import (
     NPY,
@@ -323,34 +321,11 @@ def test_a_store_of_another_service_is_refused(url: str, tmp_path: Path) -> None
         pass
 
 
-@pytest.mark.full
-def test_two_replicas_share_meshes_answers_and_jobs(
+def test_a_store_with_another_database_is_refused(
     postgres: Postgres, url: str, tmp_path: Path
 ) -> None:
-    state = {"GEODESIC_STATE": postgres.new_database()}
-    with ExitStack() as stack:
-        first, second = (
-            stack.enter_context(
-                closing(Server(url, **state, GEODESIC_COPIES=str(tmp_path / name)))  # type: ignore[arg-type]
-            )
-            for name in ("one", "two")
-        )
-        mesh_id = upload_sample(first.client, "plane", 30_000)  # type: ignore[arg-type]
-        assert upload_sample(second.client, "plane", 30_000) == mesh_id  # type: ignore[arg-type]
-        answers = [
-            distances(server.client, mesh_id, LONG).content  # type: ignore[arg-type]
-            for server in (first, second)
-        ]
-        assert answers[0] == answers[1]
-        assert np.isfinite(np.frombuffer(answers[0][128:])).all()
-        job = distances(first.client, mesh_id, {**LONG, "Prefer": "respond-async"})  # type: ignore[arg-type]
-        link = job.headers["location"]
-        wait_until(lambda: second.client.get(link).json()["status"] == "successful")
-        assert second.client.get(f"{link}/results").content == answers[0]
-        assert first.client.get(f"/v1/meshes/{mesh_id}").status_code == 200
-        assert second.client.delete(f"/v1/meshes/{mesh_id}").status_code == 204
-        check_problem(first.client.get(f"/v1/meshes/{mesh_id}"), 404, "mesh_not_found")
-        assert upload_sample(first.client, "plane", 30_000) == mesh_id  # type: ignore[arg-type]
+    with serving(url, state=postgres.new_database(), copies=tmp_path / "one"):  # type: ignore[arg-type]
+        pass
     assert "belongs to another" in refused_start(
         url,  # type: ignore[arg-type]
         GEODESIC_COPIES=str(tmp_path / "one"),

@@ -3,6 +3,8 @@
 import asyncio
 import gc
 import threading
+from contextlib import closing
+from pathlib import Path
 
 import pytest
 from starlette.testclient import TestClient
@@ -10,6 +12,9 @@ from starlette.testclient import TestClient
 from app.engine.slot import Slot
 from app.main import create_app
 from app.settings import Settings
+from tests.support.postgres import SECRET
+from tests.support.postgres import Server as Postgres
+from tests.support.processes import Server, refused_start
 from tests.support.service import check_problem, is_ready, wait_until
 
 
@@ -35,3 +40,16 @@ def test_listens_before_it_is_ready(tmp_path, monkeypatch: pytest.MonkeyPatch) -
         finally:
             may_start.set()
         wait_until(lambda: is_ready(client))
+
+
+def test_starts_that_are_refused(postgres: Postgres, tmp_path: Path) -> None:
+    wrong = postgres.url("postgres", "wrong")
+    for said in (
+        refused_start(tmp_path, "--state", wrong),
+        refused_start(tmp_path, GEODESIC_STATE=wrong),
+    ):
+        assert "password authentication failed" in said
+        assert SECRET not in said
+    with closing(Server(tmp_path)):
+        assert "GEODESIC_STATE" in refused_start(tmp_path), "it says what two services need"
+        assert "in use" in refused_start(tmp_path, "--state", postgres.new_database())

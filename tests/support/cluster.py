@@ -60,7 +60,7 @@ class Node:
 
     def named(self, name: str) -> psutil.Process:
         """Return the process with a name, such as that of an actor."""
-        (found,) = (each for each in self.tree() if name in " ".join(each.cmdline()))
+        (found,) = (each for each in self.tree() if name in _name_of(each))
         return found
 
     def workers(self) -> set[int]:
@@ -80,6 +80,10 @@ class Node:
         """End in order."""
         self.process.terminate()
         self.process.wait()
+
+
+def _name_of(process: psutil.Process) -> str:
+    return " ".join(process.cmdline())
 
 
 class ProcessCluster:
@@ -130,6 +134,12 @@ class ProcessCluster:
     def living(self) -> list[Node]:
         """Return the nodes that run."""
         return [node for node in self.nodes if node.process.poll() is None]
+
+    def named(self, name: str) -> psutil.Process:
+        """Return the process with a name, on whatever machine it is."""
+        nodes = [self.head, *self.living()]
+        (found,) = (each for node in nodes for each in node.tree() if name in _name_of(each))
+        return found
 
     def kill_head(self) -> tuple[list[str], dict[str, str]]:
         """Kill the control store; return its command and environment.

@@ -135,8 +135,8 @@ async def live(store: Store) -> None:
 async def finish(store: Store) -> None:
     """Let all jobs finish."""
     async with store.service() as (service, _):
-        for job in await service.jobs._repository.unfinished():
-            await end_of(service, job.id)
+        for job_id in await service.jobs._repository.unfinished():
+            await end_of(service, job_id)
 
 
 async def verify(store: Store) -> None:

@@ -119,6 +119,20 @@ class Server:
             self.kill()
 
 
+def refused_start(store: Path, *options: str, **settings: str) -> str:
+    """Return what a service says that does not start."""
+    ran = subprocess.run(  # noqa: S603 - this Python
+        [*COMMAND_LINE, "serve", "--port", "0", *options],
+        env=os.environ | {"GEODESIC_STORE": str(store)} | settings,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ran.returncode == 1, ran.stderr
+    assert "Traceback" not in ran.stderr
+    return " ".join(ran.stderr.split())
+
+
 @contextmanager
 def stopped(pids: Iterable[int]) -> Iterator[None]:
     """Have processes do nothing at all meanwhile; what they are given waits."""

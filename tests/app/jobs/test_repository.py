@@ -39,43 +39,35 @@ async def count_jobs(repository: JobRepository) -> None:
     mine = [new_job("alice") for _ in range(4)]
     for job in (*mine, new_job("bob"), new_job()):
         await repository.add(job, QUERY)
-    assert await repository.finished() == set()
+    assert await repository.ended() == []
 
     ended = [job.dismissed() for job in mine[:3]]
     for job in ended:
-        assert await repository.update(job, None)
+        assert await repository.update(job, 1)
     assert await repository.count("alice") == 4
-    assert await repository.finished() == {job.id for job in ended}
-    assert await repository.count_finished() == {"dismissed": 3}
+    assert {job.id for job in await repository.ended()} == {job.id for job in ended}
+    assert await repository.count_by_status() == {"accepted": 3, "dismissed": 3}
     await repository.remove(mine[1].id)
     assert await repository.count("alice") == 3
     assert await repository.count("bob") == await repository.count(None) == 1
     assert await repository.count("carol") == 0
 
 
-def test_ends_and_new_jobs_are_found_whatever_else_a_record_says(database: Database) -> None:
+def test_ends_are_found_whatever_else_a_record_says(database: Database) -> None:
     run(database, partial(find_ends, database))
 
 
 async def find_ends(database: Database, repository: JobRepository) -> None:
-    assert await repository.added(0) == (set(), 0)
     jobs = [new_job("alice"), new_job(), new_job()]
     for job in jobs:
         await repository.add(job, QUERY)
-    added, newest = await repository.added(0)
-    assert added == {job.id for job in jobs}
-    assert await repository.added(newest) == (set(), newest)
-    await repository.add(later := new_job(), QUERY)
-    assert (await repository.added(newest))[0] == {later.id}
-
     last = jobs[0].running(0.0).successful("its answer")
-    assert await repository.update(last, None)
+    assert await repository.update(last, 1)
     record = last.model_dump_json().replace('"successful"', '"unheard-of"')
     await database.run("UPDATE jobs SET record = ? WHERE id = ?", record, last.id)
-    assert await repository.update(jobs[1].dismissed(), None)
-    ids = [f"no job {number}" for number in range(1200)] + [job.id for job in jobs]
-    ended = {job.id: job for job in await repository.ended(ids)}
-    assert ended.keys() == {job.id for job in jobs[:2]} == await repository.finished()
+    assert await repository.update(jobs[1].dismissed(), 1)
+    ended = {job.id: job for job in await repository.ended()}
+    assert ended.keys() == {job.id for job in jobs[:2]}
     assert ended[last.id] == (last.id, "alice", "its answer", last.finished)
     assert ended[jobs[1].id][:3] == (jobs[1].id, None, None)
 
@@ -120,46 +112,49 @@ async def turn_pages(repository: JobRepository) -> None:
     assert await repository.page("carol", 2, None) == ([], None)
 
 
-def test_a_job_is_changed_by_its_holder_until_it_has_finished(database: Database) -> None:
+def test_a_job_is_changed_by_whoever_knows_its_state_until_it_has_finished(
+    database: Database,
+) -> None:
     run(database, change_jobs)
 
 
 async def change_jobs(repository: JobRepository) -> None:
-    job = new_job("alice").accepted_again("first")
+    job = new_job("alice")
     await repository.add(job, QUERY)
-    assert not await repository.update(job.running(0.5), None)
-    assert not await repository.update(job.running(0.5), "second")
-    assert await repository.update(job.running(0.5), "first")
-
-    taken = job.accepted_again("second")
-    assert await repository.update(taken, "first")
-    assert not await repository.update(job.successful("late"), "first")
-    last = taken.running(0.1).successful("a result")
-    assert await repository.update(last, "second")
-    assert not await repository.update(last.dismissed(), "second")
+    running = job.running(0.5)
+    assert not await repository.update(running, 2)
+    assert await repository.update(running, 1)
+    assert not await repository.update(job.successful("late"), 1)
+    assert await repository.query(job.id) == QUERY, "an end that is refused leaves the query"
+    last = running.successful("a result")
+    assert await repository.update(last, running.version)
+    assert await repository.query(job.id) is None
+    assert not await repository.update(last.dismissed(), last.version)
     assert await repository.find("alice", job.id) == last
     await repository.remove(job.id)
-    assert not await repository.update(last, "second")
+    assert not await repository.update(last, running.version)
 
 
-def test_of_two_who_take_over_a_job_one_gets_it(database: Database) -> None:
-    run(database, take_over)
+def test_of_two_who_change_a_job_one_does(database: Database) -> None:
+    run(database, change_together)
 
 
-async def take_over(repository: JobRepository) -> None:
+async def change_together(repository: JobRepository) -> None:
     job = new_job()
     await repository.add(job, QUERY)
-    taken = []
+    changed = []
 
-    async def take(name: str) -> None:
-        if await repository.update(job.accepted_again(name), None):
-            taken.append(name)
+    async def change(share: float) -> None:
+        if await repository.update(job.running(share), job.version):
+            changed.append(share)
 
     async with anyio.create_task_group() as tasks:
         for number in range(10):
-            tasks.start_soon(take, str(number))
-    assert len(taken) == 1
-    assert [each.replica for each in await repository.unfinished()] == taken
+            tasks.start_soon(change, number / 10)
+    assert len(changed) == 1
+    found = await repository.load(job.id)
+    assert found is not None
+    assert [found.progress] == changed
 
 
 def test_blocks_of_one_owner_come_one_after_the_other(database: Database) -> None:
@@ -188,11 +183,11 @@ async def store_queries(database: Database, repository: JobRepository) -> None:
     first, second, third = (new_job() for _ in range(3))
     for number, job in enumerate((first, second, third)):
         await repository.add(job, QUERY + bytes([number]))
-    await repository.update(first.running(0.0), None)
-    await repository.update(second.dismissed(), None)
+    await repository.update(first.running(0.0), 1)
+    await repository.update(second.dismissed(), 1)
     assert await repository.query(first.id) == QUERY + b"\x00"
     assert await repository.query(second.id) is None
-    assert [job.id for job in await repository.unfinished()] == [first.id, third.id]
+    assert await repository.unfinished() == [first.id, third.id]
 
     # As if killed between the record and its query.
     record = third.dismissed().model_dump_json()
@@ -201,22 +196,6 @@ async def store_queries(database: Database, repository: JobRepository) -> None:
     await repository.tidy()
     assert await repository.query(first.id) == QUERY + b"\x00"
     assert await database.rows("SELECT job_id FROM queries") == [(first.id,)]
-
-
-def test_an_end_that_comes_after_a_takeover_leaves_the_query(database: Database) -> None:
-    """Else the replica that runs the job from now on could not read it."""
-    run(database, end_late)
-
-
-async def end_late(repository: JobRepository) -> None:
-    job = new_job().accepted_again("first")
-    await repository.add(job, QUERY)
-    taken = job.accepted_again("second")
-    assert await repository.update(taken, "first")
-    assert not await repository.update(job.successful("late"), "first")
-    assert await repository.query(job.id) == QUERY
-    assert await repository.update(taken.successful("a result"), "second")
-    assert await repository.query(job.id) is None
 
 
 def test_jobs_of_a_database_without_queries_are_read(tmp_path: Path) -> None:
@@ -237,11 +216,13 @@ async def read_older(path: Path) -> None:
     database.close()
     async with opened(SqliteDatabase(path)) as database:
         repository = JobRepository(database)
-        (job,) = await repository.unfinished()
+        (job_id,) = await repository.unfinished()
+        job = await repository.load(job_id)
+        assert job is not None
         assert (job.id, job.spec.owner, job.runs) == ("1f", "alice", 0)
         assert await repository.find("alice", "1f") == job
         assert await repository.query(job.id) is None
-        await repository.update(job.dismissed(), None)
+        await repository.update(job.dismissed(), job.version)
         assert await repository.unfinished() == []
 
 
@@ -301,8 +282,8 @@ async def use(database: SqliteDatabase, folder: Path) -> None:
     with refused_for_want_of_room():
         await repository.add(new_job(), QUERY)
     for job in jobs:
-        await repository.update(job.dismissed(), None)
-    assert await repository.count_finished() == {"dismissed": 100}
+        await repository.update(job.dismissed(), job.version)
+    assert await repository.count_by_status() == {"dismissed": 100}
     for job in jobs:
         await repository.remove(job.id)
     assert await repository.page(None, 1, None) == ([], None)

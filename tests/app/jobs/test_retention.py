@@ -1,6 +1,8 @@
 """Finished jobs stay for their time, whatever happens to the clock."""
 
+from collections import Counter
 from datetime import UTC, datetime, timedelta
+from typing import Any, cast
 
 import pytest
 
@@ -32,29 +34,39 @@ def finished_job(owner: str | None = None) -> Job:
     return new_job(owner).running(0.0).successful("a result")
 
 
-def ids_due(jobs: Retention) -> list[str]:
-    return [job.id for job in jobs.due()]
+class Pins(Counter[str]):
+    """Counts the pins of each result, as a store of results does."""
+
+    def pin(self, name: str, _owner: str | None) -> None:
+        self[name] += 1
+
+    def unpin(self, name: str, _owner: str | None) -> None:
+        self[name] -= 1
+
+
+def retention_of(pins: Pins) -> Retention:
+    return Retention(cast(Any, pins), HOUR_S)
 
 
 @pytest.mark.parametrize("moved", [TEN_YEARS, -TEN_YEARS])
 def test_a_clock_that_is_moved_changes_nothing(
     clock: Clock, calendar: Calendar, moved: timedelta
 ) -> None:
-    jobs = Retention(HOUR_S)
+    jobs = retention_of(Pins())
     before = finished_job()
-    jobs.add(before)
+    jobs.add(EndedJob.of(before))
     calendar.moved = moved
     clock.now += 600
     after = finished_job()
-    jobs.add(after)
+    jobs.add(EndedJob.of(after))
 
     assert jobs.seconds_to_first(None) == 3000
     clock.now += 2999
-    assert ids_due(jobs) == []
+    assert jobs.due() == []
     clock.now += 1
-    assert ids_due(jobs) == [before.id]
+    assert jobs.due() == [before.id]
     clock.now += 600
-    assert ids_due(jobs) == [before.id, after.id]
+    assert jobs.due() == [before.id, after.id]
 
 
 def test_what_finished_before_the_start(clock: Clock, calendar: Calendar) -> None:
@@ -66,29 +78,29 @@ def test_what_finished_before_the_start(clock: Clock, calendar: Calendar) -> Non
     old, younger, to_come = ended
     calendar.moved = timedelta()
 
-    jobs = Retention(HOUR_S)
-    for job in ended:
-        assert job.finished is not None
-        jobs.add_older(EndedJob(job.id, None, job.result, job.finished))
+    jobs = retention_of(pins := Pins())
+    jobs.keep_up(map(EndedJob.of, ended))
+    jobs.keep_up(map(EndedJob.of, ended))
+    assert pins == {"a result": 3}
 
-    assert ids_due(jobs) == [old.id]
+    assert jobs.due() == [old.id]
     clock.now += 601
-    assert ids_due(jobs) == [old.id, younger.id]
-    jobs.discard(old.id)
-    jobs.discard(younger.id)
+    assert jobs.due() == [old.id, younger.id]
+    jobs.keep_up([EndedJob.of(to_come)])
+    assert pins == {"a result": 1}
     assert jobs.seconds_to_first(None) == 2999
     clock.now += 2999
-    assert ids_due(jobs) == [to_come.id]
+    assert jobs.due() == [to_come.id]
 
 
 def test_the_first_job_of_each_owner(clock: Clock) -> None:
-    jobs = Retention(HOUR_S)
+    jobs = retention_of(Pins())
     assert jobs.seconds_to_first("alice") is None
     first = finished_job("alice")
-    jobs.add(first)
+    jobs.add(EndedJob.of(first))
     clock.now += 0.5
     for owner in ("alice", "bob", None):
-        jobs.add(finished_job(owner))
+        jobs.add(EndedJob.of(finished_job(owner)))
 
     assert jobs.seconds_to_first("alice") == jobs.seconds_to_first("bob") == 3600
     clock.now += 100

@@ -10,7 +10,7 @@ import anyio
 import pytest
 
 from app.errors import StateUnavailableError, problem_of
-from app.state import MeshRecords, Replicas, StateError
+from app.state import Allowances, MeshRecords, StateError
 from app.store.folder_meshes import FolderMeshes
 from app.store.mesh_catalog import MeshCatalog
 from tests.support.databases import opened
@@ -74,7 +74,7 @@ def test_services_that_start_together_create_the_tables_once(postgres: Server) -
     assert [each.wait() for each in started] == 3 * [0]
     with psycopg.connect(url) as connection:
         assert connection.execute("SELECT version_num FROM alembic_version").fetchall() == [
-            ("0001",)
+            ("0002",)
         ]
 
 
@@ -119,9 +119,9 @@ def test_a_transaction_that_fails_leaves_nothing(postgres: Server) -> None:
         async with opened(database):
             with suppress(KeyError):
                 async with database.alone("a name") as statements:
-                    await statements.run("INSERT INTO replicas VALUES (?, ?)", "x", 1)
+                    await statements.run("INSERT INTO rates VALUES (?, ?)", "x", 1)
                     raise KeyError
-            assert await database.rows("SELECT * FROM replicas") == []
+            assert await database.rows("SELECT * FROM rates") == []
 
     anyio.run(fail)
 
@@ -129,7 +129,7 @@ def test_a_transaction_that_fails_leaves_nothing(postgres: Server) -> None:
 def test_those_who_wait_for_the_meshes_leave_connections_to_others(
     postgres: Server, tmp_path: Path
 ) -> None:
-    """Else a replica could not say that it lives while another one writes a large mesh."""
+    """Else a replica could not count a request while another one writes a large mesh."""
     url = postgres.new_database()
     ours, others = PostgresDatabase(url), PostgresDatabase(url)
     ours.prepare()
@@ -149,6 +149,6 @@ def test_those_who_wait_for_the_meshes_leave_connections_to_others(
             for _ in range(10):
                 tasks.start_soon(wait_for_meshes)
             await anyio.sleep(0)  # they come first
-            await Replicas(ours).beat()
+            await Allowances(ours, 1.0).seconds_over("alice", 1)
 
     anyio.run(wait_together)
