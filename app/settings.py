@@ -125,8 +125,8 @@ _HOST = re.compile(r"(\*\.)?[a-z0-9_-]+(\.[a-z0-9_-]+)*|\[[0-9a-f:]+\]")
 class Settings(BaseSettings):
     """All settings, validated at the start; an unknown one, or a contradiction, is an error.
 
-    One store belongs to one service, or to all that have one ``state``. The first removes
-    unfinished files from it at the start.
+    One store belongs to one service, or to all of a cluster that have one ``state``. The first
+    removes unfinished files from it at the start.
     """
 
     model_config = SettingsConfigDict(
@@ -146,7 +146,7 @@ class Settings(BaseSettings):
     engine: Literal["local", "ray"] = "local"
     """`local` computes on this machine, `ray` on the hosts of a cluster."""
     state: SecretStr | None = None
-    """URL of a PostgreSQL database that several services share; by default SQLite in the store."""
+    """URL of a PostgreSQL database, for services of a cluster; by default SQLite in the store."""
     workers: PositiveInt = Field(default_factory=available_cores)
     """Worker processes; by default one for each core."""
     worker_memory_bytes: int = Field(ge=LEAST_WORKER_MEMORY, default_factory=_worker_memory)

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 from app.engine.work import Task, TaskResult
 
 ProgressCallback = Callable[[float], None]
-"""Receives the share of the work that is done: 0 when it begins, and never less than before"""
+"""Receives the share of the work that is done: 0 when it begins, and where it is begun once more"""
 
 
 UnclaimedCallback = Callable[[str], Coroutine[Any, Any, None]]

@@ -9,6 +9,7 @@ from typing import Any
 from uuid import uuid4
 
 import structlog
+from grpc import RpcError
 from ray import serve
 from ray.exceptions import RayError
 from ray.serve.exceptions import RayServeException
@@ -36,6 +37,10 @@ _LOOK_S = 1.0
 _NOT_BEGUN = frozenset({"queue_full", "draining", "engine_unavailable"})
 """Codes of refusals by a host; another one may take the task"""
 _RETRY_AFTER = {"Retry-After": "1"}
+
+
+_LOSSES = (TimeoutError, RayError, RayServeException, RpcError, StopAsyncIteration)
+"""What a call raises whose host is lost"""
 
 
 class _HostLostError(Exception):
@@ -146,7 +151,7 @@ class RayEngine:
         return await self._run(task, on_progress)
 
     async def _run(self, task: Task, on_progress: ProgressCallback) -> TaskResult:
-        note, waits_for_host = _rising(on_progress), task.is_promised
+        waits_for_host = task.is_promised
         refusal: Problem | None = None
         without: set[str] = set()
         """Hosts that were lost with this task, or that refused it"""
@@ -161,7 +166,7 @@ class RayEngine:
                 continue
             call = Call(task, get_contextvars(), order, host=order[0])
             try:
-                outcome = await self._run_on_host(call, note)
+                outcome = await self._run_on_host(call, on_progress)
             except _HostLostError:
                 losses += 1
                 if losses > 1:
@@ -238,7 +243,7 @@ class RayEngine:
                 elif answer is not None:
                     begun = begun or time_ns()
                     on_progress(answer)
-        except (TimeoutError, RayError, RayServeException, StopAsyncIteration) as error:
+        except _LOSSES as error:
             logger.warning("host lost", host=call.host, error=repr(error))
             raise _HostLostError from error
         finally:
@@ -273,19 +278,6 @@ class RayEngine:
         for name in late - self._late:
             await self.on_unclaimed(name)
         self._late = late
-
-
-def _rising(on_progress: ProgressCallback) -> ProgressCallback:
-    """Return a callback that passes on no share that is less than one before."""
-    highest = -1.0
-
-    def note(share: float) -> None:
-        nonlocal highest
-        if share > highest:
-            highest = share
-            on_progress(share)
-
-    return note
 
 
 def _within(whole: Period, parts: Mapping[str, Period]) -> Mapping[str, Period]:

@@ -113,7 +113,9 @@ class JobRunner:
             self._live.pop(job_id).cancel()
         for job_id in unfinished:
             if job_id not in self._live or self._live[job_id].done():
-                self._live[job_id] = asyncio.create_task(self._run(job_id), name=f"job {job_id}")
+                job = await self._take(job_id)  # one after the other: the oldest goes first
+                if job is not None:
+                    self._live[job_id] = asyncio.create_task(self._run(job), name=f"job {job_id}")
 
     async def _tidy(self) -> None:
         self._retention.keep_up(await self._repository.ended())
@@ -121,21 +123,23 @@ class JobRunner:
             await self._repository.remove(job_id)
             self._retention.discard(job_id)
 
-    async def _run(self, job_id: str) -> None:
-        """Run a job to its end; leave it where another process has ended it, or runs it."""
+    async def _take(self, job_id: str) -> Job | None:
+        """Return a job that is to be run, with its new state where it was under way before."""
         job = await self._repository.load(job_id)
         if job is None or job.is_finished:
-            return
+            return None
+        if job.started is None or job.runs >= _MOST_RUNS:
+            return job
+        again = job.accepted_again()
+        return again if await self._record(job, again) else None
+
+    async def _run(self, job: Job) -> None:
+        """Run a job to its end; leave it where another process has ended it, or runs it."""
         with bound_contextvars(request_id=job.spec.request_id):
             if job.runs >= _MOST_RUNS:
                 await self._end(job, job.failed(_STOPPED_TOO_OFTEN))
-                return
-            if job.started is not None:
-                again = job.accepted_again()
-                if not await self._record(job, again):
-                    return
-                job = again
-            await self._work(job)
+            else:
+                await self._work(job)
 
     async def _work(self, job: Job) -> None:
         changed, share = asyncio.Event(), -1.0

@@ -39,8 +39,8 @@ def owned(root: Path) -> Iterator[None]:
         setting = variable_of("store")
         raise StoreError(
             f"the store {root} is in use by another process: stop that process first. To run a "
-            f"second service, give it its own store, see {setting}, or give both the same "
-            f"PostgreSQL database, see {variable_of('state')}"
+            f"second service, give it its own store, see {setting}, or make both services of a "
+            f"cluster with the same PostgreSQL database, see {variable_of('state')}"
         ) from None
     except OSError as error:
         raise StoreError(f"the store {root} cannot be written: {error.strerror}") from error

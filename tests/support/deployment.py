@@ -138,7 +138,8 @@ class Deployment:
         """Return a service, and Ray beside it on its machine."""
         _, ray, settings, log = self._ray(machine, name, self._joining, {})
         serve = [*COMMAND_LINE, "serve", "--host", machine.address, "--port", str(PORT)]
-        both = f"{shlex.join(ray)} & sleep 5; exec {shlex.join(serve)}"
+        joining = shlex.join(word for word in ray if word != "--block")
+        both = f"{joining} && exec {shlex.join(serve)}"
         own = {"GEODESIC_ENGINE": "ray", "RAY_ADDRESS": self._address}
         return Replica(machine, ["sh", "-c", both], {**settings, **own}, log)
 
