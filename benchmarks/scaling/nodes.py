@@ -24,10 +24,6 @@ MIX = ((0.5, "path", 20_000), (0.3, "distances", 10_000), (0.2, "distances", 40_
 """Shares of questions, their kinds, and the faces of their meshes; all of them are small work"""
 CLIENTS = 48
 """Connections, more than ever are in use"""
-PORT = 6394
-"""Of the head of a cluster on this machine"""
-
-
 SECRET = "a-key-of-benchmarks-only"  # noqa: S105 - of no other use
 """Of a caller with a name, whose seconds of workers are in the metrics"""
 SETTINGS = {"GEODESIC_QUEUE_SIZE": "1000", "GEODESIC_API_KEYS": f"bench:{SECRET}"}
@@ -197,7 +193,7 @@ def cluster(nodes: int) -> Iterator[Nodes]:
     """Run a replica, and nodes of one worker each, that Ray connects."""
     with ExitStack() as stack:
         store = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        made = stack.enter_context(running_cluster(store, PORT, **SETTINGS))
+        made = stack.enter_context(running_cluster(store, **SETTINGS))
         hosts = [made.add_node().process.pid for _ in range(nodes)]
         served = stack.enter_context(serving_process(**made.settings, **made.of_services))
         yield _ready(f"a replica and nodes of one worker: {nodes}", *served, Shape(nodes, 1), hosts)

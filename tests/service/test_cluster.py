@@ -28,8 +28,6 @@ pytestmark = [
     pytest.mark.skipif(find_spec("ray") is None, reason="needs the extra cluster"),
 ]
 
-PORT = 6391
-"""Of the head"""
 ASYNC = {"Prefer": "respond-async"}
 CANCELLED, LOST = "geodesic_cancellations_total", "geodesic_workers_lost_total"
 IDLE, BUSY = 'geodesic_workers{state="idle"}', 'geodesic_workers{state="busy"}'
@@ -95,7 +93,7 @@ def local(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
 
 @pytest.fixture(scope="module")
 def spread(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
-    with running_cluster(tmp_path_factory.mktemp("shared"), PORT) as cluster:
+    with running_cluster(tmp_path_factory.mktemp("shared")) as cluster:
         cluster.add_node()
         cluster.add_node()
         place = Place(cluster.serve(), cluster)

@@ -18,8 +18,6 @@ from tests.support.waiting import wait_until
 pytest.importorskip("ray")
 pytestmark = pytest.mark.full
 
-PORT = 6393
-"""Of the head"""
 OF_A_HOST = ("queue", "worker")
 PHASES = ("load", "compute", "encode")
 
@@ -32,7 +30,7 @@ def collector() -> Iterator[Collector]:
 
 @pytest.fixture(scope="module")
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ProcessCluster]:
-    with running_cluster(tmp_path_factory.mktemp("traced"), PORT) as cluster:
+    with running_cluster(tmp_path_factory.mktemp("traced")) as cluster:
         cluster.settings["GEODESIC_LOG_FORMAT"] = "json"
         # A worker holds no field in memory, so that it reads those in the store.
         cluster.settings["GEODESIC_WORKER_FIELD_BYTES"] = "1"

@@ -22,8 +22,6 @@ pytestmark = [
     pytest.mark.skipif(find_spec("ray") is None, reason="needs the extra cluster"),
 ]
 
-PORT = 6395
-"""Of the head"""
 ASYNC = {"Prefer": "respond-async"}
 LIMITS = {"GEODESIC_QUOTA_UPLOADS": "1", "GEODESIC_QUEUE_SIZE": "1000"}
 
@@ -35,7 +33,7 @@ def cluster(
     postgres: Postgres, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[ProcessCluster]:
     state = {"GEODESIC_STATE": postgres.new_database()}
-    with running_cluster(tmp_path_factory.mktemp("store"), PORT, **state, **LIMITS) as cluster:
+    with running_cluster(tmp_path_factory.mktemp("store"), **state, **LIMITS) as cluster:
         cluster.add_node()
         yield cluster
 

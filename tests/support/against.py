@@ -22,8 +22,6 @@ from tests.support.processes import Server
 from tests.support.s3 import S3
 from tests.support.waiting import LONG_S, wait_until
 
-PORT = 6392
-"""Of the head"""
 SERVICE, CLUSTER = "service", "cluster"
 NODES = 2
 IN_THIS_PROCESS = ("monkeypatch", "sweeps")
@@ -116,7 +114,7 @@ def serving_cluster(
     s3: S3, store: str, state: str, folder: Path, **settings: Any
 ) -> Iterator[ClusterClient]:
     """Run two replicas and two nodes inside the block, on URLs of a store and of a database."""
-    with running_cluster(store, PORT) as cluster:
+    with running_cluster(store) as cluster:
         shared = {"store": store, "state": state} | settings
         cluster.settings |= {f"GEODESIC_{key.upper()}": str(shared[key]) for key in shared}
         cluster.settings |= s3.environment

@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -89,7 +90,7 @@ def _name_of(process: psutil.Process) -> str:
 class ProcessCluster:
     """The processes of a cluster, whose machines share one store."""
 
-    def __init__(self, store: Path | str, folder: Path, port: int, **settings: str) -> None:
+    def __init__(self, store: Path | str, folder: Path, **settings: str) -> None:
         self.folder, self.store = folder, store
         self.settings = {
             **variables_of_ray(),
@@ -101,6 +102,9 @@ class ProcessCluster:
         self.nodes: list[Node] = []
         self.servers: list[Server] = []
         self._stores: list[subprocess.Popen[bytes]] = []
+        with socket.socket() as probe:
+            probe.bind((HEAD, 0))
+            port = probe.getsockname()[1]
         self._address = f"{HEAD}:{port}"
         records = {"RAY_gcs_storage": "rocksdb", "RAY_gcs_storage_path": str(folder / "records")}
         head = [
@@ -176,10 +180,10 @@ class ProcessCluster:
 
 
 @contextmanager
-def running_cluster(store: Path | str, port: int, **settings: str) -> Iterator[ProcessCluster]:
+def running_cluster(store: Path | str, **settings: str) -> Iterator[ProcessCluster]:
     """Run a head inside the block; nodes and services are added."""
     with tempfile.TemporaryDirectory(prefix="g", ignore_cleanup_errors=True) as folder:
-        cluster = ProcessCluster(store, Path(folder), port, **settings)
+        cluster = ProcessCluster(store, Path(folder), **settings)
         try:
             yield cluster
         finally:
