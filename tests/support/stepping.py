@@ -15,7 +15,7 @@ from geodesic_core.kernels.front.state import (
     with_larger_pool,
     with_larger_scratch,
 )
-from geodesic_core.kernels.front.window import Window
+from geodesic_core.kernels.front.window import NO_WINDOW, Window
 from geodesic_core.kernels.mesh.half_edges import LENGTH, OPPOSITE, Topology
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.sweep import continuous_dijkstra
@@ -68,7 +68,8 @@ def view_of_arrays(topology, wave, bounds=exact_bounds(math.inf)) -> View:  # no
 
 def window(b0, b1, sx, sy, sigma, xi=0.0, root=0) -> Window:
     """A window whose rays are not parallel."""
-    return Window(b0, b1, sx, sy, sigma, 1.0, root, xi, -1 - root)
+    ends = NO_WINDOW._replace(b0=b0, b1=b1, root=root, reference=-1 - root)
+    return ends._replace(sx=sx, sy=sy, sigma=sigma, xi=xi)
 
 
 def with_pool(wave: Wavefront, **arrays) -> Wavefront:
