@@ -69,7 +69,7 @@ def view_of_arrays(topology, wave, bounds=exact_bounds(math.inf)) -> View:  # no
 def window(b0, b1, sx, sy, sigma, xi=0.0, root=0) -> Window:
     """A window whose rays are not parallel."""
     ends = NO_WINDOW._replace(b0=b0, b1=b1, root=root, reference=-1 - root)
-    return ends._replace(sx=sx, sy=sy, sigma=sigma, xi=xi)
+    return ends._replace(sx=sx, sy=sy, sigma=sigma, xi=xi, turn=0.0)  # NaN equals nothing
 
 
 def with_pool(wave: Wavefront, **arrays) -> Wavefront:
