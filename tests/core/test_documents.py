@@ -54,7 +54,7 @@ OBJECTS = ("field", "path", "solver", "mesh")
 """Whose attributes are named like functions of a module."""
 BUILT = ("app/web/dist", "docs/_build")
 """Folders that a build makes."""
-VARIABLES = ("NUMBA_", "GEODESIC_", "OTEL_", "FORWARDED_", "HATCH_", "XDG_")
+VARIABLES = ("NUMBA_", "GEODESIC_", "OTEL_", "FORWARDED_", "HATCH_", "RAY_", "XDG_")
 """Beginnings of environment variables."""
 COLUMNS = ("ENTRY_EDGE",)
 """Of the state, which are no tolerances."""

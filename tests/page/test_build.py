@@ -30,7 +30,7 @@ def scripts_of(service: str, address: str, seen: set[str]) -> Iterator[bytes]:
 def test_the_page_begins_with_little_script(service: str) -> None:
     page = httpx2.get(service, headers={"Accept": "text/html"}).text
     seen: set[str] = set()
-    first = re.findall(r'(?:src|href)="(/assets/[^"]+\.js)"', page)
+    first = re.findall(r'(?:src|href)="\.(/assets/[^"]+\.js)"', page)
     scripts = [script for each in first for script in scripts_of(service, each, seen)]
 
     assert scripts
@@ -40,7 +40,7 @@ def test_the_page_begins_with_little_script(service: str) -> None:
 def test_the_page_loads_nothing_from_elsewhere(service: str) -> None:
     page = httpx2.get(service, headers={"Accept": "text/html"}).text
 
-    assert re.findall(r'(?:src|href)="(?!/)', page) == []
+    assert re.findall(r'(?:src|href)="(?!\./)', page) == []
 
 
 @pytest.mark.usefixtures("service")

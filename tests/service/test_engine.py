@@ -74,7 +74,7 @@ def slow(two: ServiceClient) -> str:
 @pytest.fixture
 def distances_are_long(monkeypatch: pytest.MonkeyPatch) -> None:
     """Distances are no small work, on whatever mesh."""
-    monkeypatch.setattr(DistancesQuery, "is_small", lambda *_: False)
+    monkeypatch.setattr(DistancesQuery, "is_small", False)
 
 
 @pytest.fixture
@@ -350,7 +350,7 @@ def test_small_work_that_waits_goes_on_when_a_worker_dies(
         await open_slot(slot)
 
     monkeypatch.setattr(Slot, "open", open_later)
-    monkeypatch.setattr(DistancesQuery, "is_small", lambda *_: True)
+    monkeypatch.setattr(DistancesQuery, "is_small", True)
     try:
         with under_way(two, slow) as (jobs, busy):
             waiting = threads.submit(ask, two, small)

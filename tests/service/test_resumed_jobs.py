@@ -26,8 +26,10 @@ QUERIES: dict[str, dict[str, Any]] = {
     "matrix": {"sources": [VERTEX, INSIDE], "targets": [{"vertex": 9}]},
     "nearest": {"source": INSIDE, "candidates": [{"vertex": 9}, VERTEX], "k": 2},
     "locate": {"points": [[0.1, 0.2, 0.3]]},
+    "steps": {"source": VERTEX, "target": INSIDE},
 }
 """A query of each kind"""
+LINKS = {kind: kind for kind in QUERIES} | {"steps": "path/steps"}
 
 
 @contextmanager
@@ -72,7 +74,10 @@ def test_each_kind_of_query_has_the_same_answer(
         if media_type == "application/json" or kind in ("distances", "matrix")
     }
     with held(tmp_path) as (first, mesh):
-        jobs = {kind: submit(first, f"{mesh}/{kind}", body, accept) for kind, body in asked.items()}
+        jobs = {
+            kind: submit(first, f"{mesh}/{LINKS[kind]}", body, accept)
+            for kind, body in asked.items()
+        }
 
     assert mesh == f"/v1/meshes/{upload_sample(client, 'terrain', 200)}"
     with serving(tmp_path) as second:
@@ -80,7 +85,7 @@ def test_each_kind_of_query_has_the_same_answer(
             document = end_of(second, job)
             assert (document["status"], document["kind"]) == ("successful", kind)
             answer = second.get(f"{job}/results")
-            expected = client.post(f"{mesh}/{kind}", json=asked[kind], headers=accept)
+            expected = client.post(f"{mesh}/{LINKS[kind]}", json=asked[kind], headers=accept)
             assert expected.status_code == 200
             assert answer.content == expected.content
             assert answer.headers["etag"] == expected.headers["etag"]

@@ -386,7 +386,7 @@ def test_every_call_takes_barriers_as_the_mesh_does(case):
 @pytest.mark.jit
 def test_barriers_of_a_call_count_as_its_memory():
     mesh = gc.samples.plane(800)
-    needed = sum(array.nbytes for array in mesh.topology)
+    needed = sum(array.nbytes for array in (*mesh.topology, mesh.positions))
     calls = (
         lambda **limits: gc.shortest_path(mesh, 10, 20, **limits),
         lambda **limits: gc.distance_matrix(mesh, 10, 20, **limits),

@@ -1,4 +1,4 @@
-"""What pseudosources and pieces of curves send over the edges before them."""
+"""Pseudosources and pieces of curves: what they send over the edges before them."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What a window brings to the vertex opposite its edge."""
+"""Vertices reached by a window over the edge opposite to them."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""How often a list may come up, and what happens then."""
+"""Lists that come up again and again: how often they may, and what happens then."""
 
 import math
 
