@@ -57,7 +57,10 @@ def pruning_toward(
     )
 
 
-NO_PRUNING = pruning_toward(np.empty((0, 3)), np.zeros(3), math.inf)
+_NO_POSITIONS = np.empty((0, 3))
+_NO_POSITIONS.flags.writeable = False  # as those of meshes: kernels are compiled for that type
+
+NO_PRUNING = pruning_toward(_NO_POSITIONS, np.zeros(3), math.inf)
 """The bounds of a sweep that is not pruned."""
 
 ABSENT_PRUNING = PruningBounds(*[ABSENT] * len(PruningBounds._fields))
