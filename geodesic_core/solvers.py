@@ -604,7 +604,8 @@ def log_map(
 
     Notes
     -----
-    Windows carry the direction through the sweep, which takes a tenth more time than `exact_distance`.
+    Windows carry the direction through the sweep, which takes a tenth more time than that of
+    `exact_distance`.
     Behind the first bend of a path all vertices have its direction: see `LogMap`.
 
     Examples
