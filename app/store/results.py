@@ -62,8 +62,6 @@ class Result:
     body: bytes | None
     """The whole body, where it is small"""
     has_files: bool
-    is_reusable: bool = True
-    """Whether it stays in the store once it has been sent"""
 
     @property
     def key(self) -> str:
@@ -350,18 +348,14 @@ class ResultStore:
             await self.index(name)
             self.make_room()
 
-    def add(self, result: Result, *, is_reusable: bool = True) -> Result:
+    def add(self, result: Result) -> Result:
         """Acquire a result that a worker has just written."""
-        if is_reusable:
-            self._cache_small(result)
-            return self._acquire(result)
-        return self._acquire(replace(result, is_reusable=False))
+        self._cache_small(result)
+        return self._acquire(result)
 
     def release(self, result: Result) -> None:
         """End the use of a result that was acquired."""
         self._decrement_use(result.name)
-        if not result.is_reusable and result.name not in self._pinned:
-            self._remove(result.name)
         self.make_room()
 
     async def with_files(self, result: Result) -> Result:

@@ -11,7 +11,7 @@ from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument, InvalidPoint
 from geodesic_core.fields.question import Question
-from geodesic_core.fields.straight_lines import StraightLine, lines_from
+from geodesic_core.fields.straight_lines import lines_from
 from geodesic_core.fields.sweeps import DirectedSweep
 from geodesic_core.kernels.front.directions import angles_at_sources
 from geodesic_core.mesh.frames import Frame, direction_of, frame_at
@@ -68,6 +68,7 @@ class LogMap:
     """(V,) int32: vertices that the path bends at; -1 where unreachable."""
     total_angle: float
     """Sum of the angles of the surface around the source, radians."""
+    _max_distance: float
     _frame: Frame
     _axis: float
     """Angle of the x axis in the frame"""
@@ -92,7 +93,8 @@ class LogMap:
         Returns
         -------
         Polar
-            Its distance, and the angle of the shortest path; infinite and NaN if unreachable.
+            Its distance, and the angle of the shortest path; infinite and NaN if unreachable, or
+            beyond the limit of the map.
 
         Raises
         ------
@@ -114,7 +116,7 @@ class LogMap:
             v = place.vertex_index
             return Polar(float(self.distances[v]), float(self.angles[v]))
         control = Control()
-        question = Question.of(self.mesh, self.source, place, math.inf, control)
+        question = Question.of(self.mesh, self.source, place, self._max_distance, control)
         distances, angles, _ = _swept(question, control)
         node = question.nodes.targets[0]
         angle = self._frame.angles(angles[[node]]) - self._axis
@@ -154,12 +156,10 @@ class LogMap:
         if pairs.ndim != 2 or pairs.shape[1] != 2 or not np.isfinite(pairs).all():
             raise InvalidArgument("coordinates must be pairs of finite numbers, (N, 2)")
         turns = np.mod(np.arctan2(pairs[:, 1], pairs[:, 0]), 2.0 * math.pi) / self._scale
-        return [line.locations[-1] for line in self._lines(turns, np.hypot(*pairs.T))]
-
-    def _lines(self, angles: Floats, lengths: Floats) -> list[StraightLine]:
-        angles = self._frame.kernel_angles(angles + self._axis)
-        starts = [self.source] * len(angles)
-        return lines_from(self.mesh, starts, angles, lengths, False, Control())
+        angles = self._frame.kernel_angles(turns + self._axis)
+        starts, lengths = [self.source] * len(angles), np.hypot(*pairs.T)
+        lines = lines_from(self.mesh, starts, angles, lengths, False, Control())
+        return [line.locations[-1] for line in lines]
 
     def _in_range(self, angles: Floats) -> Floats:
         """Return angles from 0 up to the total angle; at a boundary, from the x axis on."""
@@ -216,6 +216,7 @@ def log_map_of(question: Question, control: Control, x_axis: Any, *, rescale: bo
         angles=angles[inner] - axis,
         bends=bends[inner],
         total_angle=frame.total_angle,
+        _max_distance=question.max_distance,
         _frame=frame,
         _axis=axis,
         _scale=turn / frame.total_angle if is_rescaled else 1.0,

@@ -357,12 +357,9 @@ def test_what_is_small_and_found_at_once_has_no_files(roomy: ResultStore, tmp_pa
     assert find(roomy, "m/a") is None
 
 
-@pytest.mark.parametrize("is_reusable", [True, False])
-def test_files_come_when_they_are_needed(
-    roomy: ResultStore, tmp_path: Path, is_reusable: bool
-) -> None:
+def test_files_come_when_they_are_needed(roomy: ResultStore, tmp_path: Path) -> None:
     written = write(tmp_path, "m/a", is_cheap=True)
-    taken = roomy.add(written, is_reusable=is_reusable)
+    taken = roomy.add(written)
 
     filed = anyio.run(roomy.with_files, taken)
     roomy.pin("m/a", None)

@@ -197,6 +197,19 @@ def test_any_point_has_its_place_and_exp_leads_there():
             assert np.linalg.norm(away) <= 1e-11
 
 
+def test_points_beyond_the_limit_have_no_place():
+    mesh = gc.TriangleMesh(*zoo.grid(6, 6))
+    log_map = gc.log_map(mesh, 0, max_distance=2.0)
+    for place in ([1.1, 0.3, 0.0], [1.9, 0.9, 0.0], [3.2, 2.1, 0.0]):
+        distance, angle = log_map.at(mesh.locate(place))
+        true = math.hypot(*place)
+        if true <= 2.0:
+            assert distance == pytest.approx(true, rel=1e-14)
+            assert apart(angle, math.atan2(place[1], place[0])) <= ANGLE
+        else:
+            assert (distance, math.isnan(angle)) == (math.inf, True)
+
+
 def test_what_is_not_reached_has_no_direction():
     mesh = gc.TriangleMesh(*zoo.joined(zoo.grid(3, 3), zoo.grid(2, 2)))
     log_map = gc.log_map(mesh, 0, max_distance=2.0)
