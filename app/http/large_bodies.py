@@ -1,4 +1,4 @@
-"""Large bodies of queries: each caller has a line of its own, so that nobody waits for another's.
+"""Large bodies of queries: each caller has a queue of its own, so that nobody waits for another's.
 
 To read and check a body of 40 000 points on the event loop would take a tenth of a second. It is
 done in a thread, and a caller has one at a time. A few bodies of a caller are in memory; the others
@@ -33,7 +33,7 @@ T = TypeVar("T")
 
 
 @dataclass(eq=False)
-class _Line:
+class _Queue:
     """The large bodies of one caller."""
 
     places: Semaphore = field(default_factory=lambda: Semaphore(READ_AT_ONCE))
@@ -41,10 +41,10 @@ class _Line:
 
 
 class LargeBodies:
-    """The lines of all callers that have large bodies at the moment."""
+    """The queues of all callers that have large bodies at the moment."""
 
     def __init__(self) -> None:
-        self._lines: WeakValueDictionary[str, _Line] = WeakValueDictionary()
+        self._queues: WeakValueDictionary[str, _Queue] = WeakValueDictionary()
         self.checking = CapacityLimiter(CHECKED_AT_ONCE)
         """Threads that check bodies"""
 
@@ -58,13 +58,13 @@ class LargeBodies:
         if declared.isdigit() and int(declared) < LARGE:
             yield
             return
-        line = self._line(request)
+        queue = self._queue(request)
         async with time_limit(service_of(request).settings, deadline_s):
-            await line.places.acquire()
+            await queue.places.acquire()
         try:
             yield
         finally:
-            line.places.release()
+            queue.places.release()
 
     async def check(self, request: Request, deadline_s: float, do: Callable[[], T]) -> T:
         """Run work whose time grows with the body: in a thread, where the body is large.
@@ -73,11 +73,11 @@ class LargeBodies:
         """
         if len(await request.body()) < LARGE:
             return do()
-        working = self._in_thread(self._line(request), do)
+        working = self._in_thread(self._queue(request), do)
         async with time_limit(service_of(request).settings, deadline_s):
             return await while_connected(request, working)
 
-    async def _in_thread(self, line: _Line, do: Callable[[], T]) -> T:
+    async def _in_thread(self, queue: _Queue, do: Callable[[], T]) -> T:
         """Do work in the turn of a caller, which then rests as long as the work took.
 
         The work holds the interpreter, of which others get at least half in this way.
@@ -92,14 +92,14 @@ class LargeBodies:
             finally:
                 spent = thread_time() - began
 
-        await line.turn.acquire()
+        await queue.turn.acquire()
         try:
             return await to_thread.run_sync(measured, limiter=self.checking)
         finally:
-            get_running_loop().call_later(spent, _end_turn, line)
+            get_running_loop().call_later(spent, _end_turn, queue)
 
-    def _line(self, request: Request) -> _Line:
-        return self._lines.setdefault(caller_of(request).name, _Line())
+    def _queue(self, request: Request) -> _Queue:
+        return self._queues.setdefault(caller_of(request).name, _Queue())
 
 
 def large_bodies_of(request: Request) -> LargeBodies:
@@ -108,5 +108,5 @@ def large_bodies_of(request: Request) -> LargeBodies:
     return bodies
 
 
-def _end_turn(line: _Line) -> None:
-    line.turn.release()  # the line lives as long as its turn
+def _end_turn(queue: _Queue) -> None:
+    queue.turn.release()  # the queue lives as long as its turn

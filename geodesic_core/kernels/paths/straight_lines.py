@@ -70,6 +70,26 @@ class Line(NamedTuple):
     left: float
 
 
+@inlined
+def on_half_edge(h: int, x: float, dx: float, dy: float, left: float) -> Line:
+    """Return a line at x on a half-edge, with so much left to go."""
+    return Line(-1, h, GOES_ON, 0.0, x, 0.0, dx, dy, left)
+
+
+@inlined
+def stopped(line: Line, stop: int) -> Line:
+    """Return a line that ends where it is, in its face."""
+    x, y, dx, dy = line.x, line.y, line.dx, line.dy
+    return Line(-1, line.half_edge, stop, 0.0, x, y, dx, dy, line.left)
+
+
+@inlined
+def ahead(line: Line, far: float) -> Line:
+    """Return a line farther on in its face."""
+    x, y, left = line.x + far * line.dx, line.y + far * line.dy, line.left - far
+    return Line(-1, line.half_edge, GOES_ON, 0.0, x, y, line.dx, line.dy, left)
+
+
 class Trail(NamedTuple):
     """Points at which lines cross edges and vertices, each with the face crossed before."""
 
@@ -150,7 +170,7 @@ def into_corner(topology: Topology, line: Line) -> Line:
     inward = line.angle - topology.corner_angles[corner]
     h: Any = np.int64(topology.corners[corner])  # one type of a line
     dy = max(math.sin(inward), 0.0)
-    return Line(-1, h, GOES_ON, line.angle, 0.0, 0.0, math.cos(inward), dy, line.left)
+    return on_half_edge(h, 0.0, math.cos(inward), dy, line.left)
 
 
 @kernel
@@ -181,10 +201,8 @@ def cross_face(topology: Topology, line: Line) -> tuple[Line, int, float]:
         far, node = x * sine / rise, previous(h)
         parameter = 1.0 - x * dy / rise / to_left
     if line.left <= far:
-        x, y = x + line.left * dx, line.left * dy
-        return Line(-1, h, AT_LENGTH, 0.0, x, y, dx, dy, 0.0), node, parameter
-    rest = line.left - far
-    return Line(-1, h, GOES_ON, 0.0, x + far * dx, far * dy, dx, dy, rest), node, parameter
+        return stopped(ahead(line, line.left), AT_LENGTH), node, parameter
+    return ahead(line, far), node, parameter
 
 
 @inlined
@@ -204,15 +222,14 @@ def over_edge(topology: Topology, line: Line, m: int, parameter: float) -> Line:
     geometry, h, dx, dy = topology.geometry, line.half_edge, line.dx, line.dy
     across: Any = np.int64(topology.links[m, OPPOSITE])
     if across < 0:
-        stop = AT_BOUNDARY if across == NO_FACE else AT_NON_MANIFOLD
-        return Line(-1, h, stop, 0.0, line.x, line.y, dx, dy, line.left)
+        return stopped(line, AT_BOUNDARY if across == NO_FACE else AT_NON_MANIFOLD)
     if m == following(h):
         cosine, sine = geometry[h, COS_RIGHT], geometry[h, SIN_RIGHT]
     else:
         cosine, sine = geometry[h, COS_LEFT], -geometry[h, SIN_LEFT]
     x = (1.0 - parameter) * geometry[m, LENGTH]
     dx, dy = dx * cosine - dy * sine, dx * sine + dy * cosine
-    return Line(-1, across, GOES_ON, 0.0, x, 0.0, dx, dy, line.left)
+    return on_half_edge(across, x, dx, dy, line.left)
 
 
 @kernel
@@ -264,12 +281,12 @@ def enter_face(geometry: Floats, h: int, x: float, y: float, angle: float, left:
     (x, y) and ``angle`` are in the frame of h.
     """
     dx, dy, nearest = math.cos(angle), math.sin(angle), math.inf
-    line = Line(-1, h, GOES_ON, 0.0, x, 0.0, dx, dy, left)
+    line = on_half_edge(h, x, dx, dy, left)
     for _ in range(3):
         if dy > 0.0 and y < nearest * dy:
             nearest = y / dy
             place = min(max(x - nearest * dx, 0.0), geometry[h, LENGTH])
-            line = Line(-1, h, GOES_ON, 0.0, place, 0.0, dx, dy, left + nearest)
+            line = on_half_edge(h, place, dx, dy, left + nearest)
         # To the frame of the following half-edge
         cosine, sine, x = -geometry[h, COS_RIGHT], geometry[h, SIN_RIGHT], x - geometry[h, LENGTH]
         x, y = x * cosine + y * sine, y * cosine - x * sine
