@@ -136,17 +136,17 @@ def test_reading_a_large_body_rests_as_long_as_it_held_the_interpreter(
 ) -> None:
     """So its caller's next one waits, and others get half of the interpreter."""
     clock, rests = iter([1.0, 3.5]), []
-    loop = SimpleNamespace(call_later=lambda seconds, end, line: rests.append((seconds, end, line)))
+    loop = SimpleNamespace(call_later=lambda seconds, end, queue: rests.append((seconds, end, queue)))
     monkeypatch.setattr(large_bodies, "thread_time", lambda: next(clock))
     monkeypatch.setattr(large_bodies, "get_running_loop", lambda: loop)
-    line = large_bodies._Line()
+    queue = large_bodies._Queue()
 
     async def check() -> int:
-        return await large_bodies.LargeBodies()._in_thread(line, lambda: 1 // (not fails))
+        return await large_bodies.LargeBodies()._in_thread(queue, lambda: 1 // (not fails))
 
     with pytest.raises(ZeroDivisionError) if fails else nullcontext():
         assert anyio.run(check) == 1
     ((seconds, end, resting),) = rests
-    assert (seconds, resting, line.turn.locked()) == (2.5, line, True)
+    assert (seconds, resting, queue.turn.locked()) == (2.5, queue, True)
     end(resting)
-    assert not line.turn.locked()
+    assert not queue.turn.locked()
