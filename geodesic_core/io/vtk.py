@@ -3,6 +3,7 @@
 import importlib.util
 import io
 import json
+import os
 import subprocess
 import sys
 
@@ -30,8 +31,11 @@ def read_vtk(data: bytes, max_faces: int | None) -> FileContents:
     memory = _MEMORY + _MEMORY_OF_BYTE * len(data)
     command = [sys.executable, "-P", vtk_polygons.__file__, str(seconds), str(memory)]
     refusal = f"VTK cannot read the file in {seconds} s and {memory >> 20} MiB"
+    environment = {**os.environ, "GLIBC_TUNABLES": vtk_polygons.FILLED_MEMORY}
     pipe = subprocess.PIPE
-    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe) as process:  # noqa: S603
+    with subprocess.Popen(  # noqa: S603
+        command, stdin=pipe, stdout=pipe, stderr=pipe, env=environment
+    ) as process:
         if process.stdout is not None:
             process.stdout.readline()  # `READY`, or it has ended
         try:

@@ -4,7 +4,6 @@ A damaged file can crash VTK's readers, or have them run on. So `vtk` runs this 
 of its own, which imports nothing else of the library and starts in half a second.
 """
 
-import ctypes
 import importlib
 import json
 import re
@@ -25,8 +24,10 @@ _POLYGONS = (5, 7, 9)
 _BEZIER = (76, 77)
 _HIDDEN_POINT, _DOUBLE_OR_HIDDEN_CELL = 2, 1 | 32
 """Flags of VTK's ghost arrays."""
-_M_PERTURB, _FILL = -6, 0xFE
-"""Of glibc's ``mallopt``: that memory is filled; and the byte for it"""
+_FILL = 0xFE
+"""Byte with which glibc fills memory, as `FILLED_MEMORY` tells it to"""
+FILLED_MEMORY = f"glibc.malloc.perturb={_FILL ^ 0xFF}:glibc.malloc.tcache_count=0"
+"""Value of ``GLIBC_TUNABLES``; memory in caches of threads would not be filled"""
 _LEGACY = b"# vtk DataFile"
 _GRAVE = re.compile("Error reading|coordinates read")
 """What warnings say where VTK (9.7) goes on with memory that it has not filled"""
@@ -266,19 +267,11 @@ def _answer(content: bytes, out: BinaryIO) -> None:
         np.save(out, array)
 
 
-def _mark_memory() -> None:
-    """Have all memory filled with bytes by which `_check_filled` knows it; with glibc only."""
-    try:
-        ctypes.CDLL(None).mallopt(_M_PERTURB, _FILL ^ 0xFF)
-    except (AttributeError, OSError, TypeError):  # macOS, Windows and others
-        return
-
-
 def _check_filled(points: NDArray[np.float64]) -> None:
     """Refuse points that VTK has left as the memory was.
 
-    Of a damaged file it may give such points without an error (9.7). The least numbers of a type
-    that begin with `_FILL` twice are far below all coordinates, of four bytes and of eight.
+    Of a damaged file it may give such points without an error (9.7). With glibc they are numbers
+    that begin with `_FILL` twice: far below all coordinates, of four bytes and of eight.
     """
     for size in (4, 8):
         ends = [bytes([_FILL, _FILL]).rjust(size, bytes([end])) for end in (0, 0xFF)]
@@ -300,7 +293,6 @@ def _limit(seconds: int, memory: int) -> None:
 
 
 if __name__ == "__main__":
-    _mark_memory()
     _limit(*map(int, sys.argv[1:]))
     for name in ("FiltersCore", "IOLegacy", "IOXML"):
         importlib.import_module(f"vtkmodules.vtk{name}")

@@ -136,7 +136,7 @@ def test_reading_a_large_body_rests_as_long_as_it_held_the_interpreter(
 ) -> None:
     """So its caller's next one waits, and others get half of the interpreter."""
     clock, rests = iter([1.0, 3.5]), []
-    loop = SimpleNamespace(call_later=lambda seconds, end, queue: rests.append((seconds, end, queue)))
+    loop = SimpleNamespace(call_later=lambda seconds, end, line: rests.append((seconds, end, line)))
     monkeypatch.setattr(large_bodies, "thread_time", lambda: next(clock))
     monkeypatch.setattr(large_bodies, "get_running_loop", lambda: loop)
     queue = large_bodies._Queue()
