@@ -67,13 +67,13 @@ class DistancesQuery(Query[DistancesRequest]):
     def check_format(self, media_type: str) -> None:
         """Refuse a second array in binary."""
         message = "does not come with a bare array; ask for json, csv or ply"
-        faults = [Fault("/include", f"{name} {message}") for name in self._included]
+        faults = [Fault("/include", f"{name} {message}") for name in self.request.include]
         if faults and media_type in (NPY, OCTETS):
             raise problem("invalid_request", f"{media_type} holds one array", errors=tuple(faults))
 
     def value_count(self) -> int:
         """Return the number of distances, and of the values that are included with each."""
-        columns = 1 + sum(_VALUES_INCLUDED[name] for name in self._included)
+        columns = 1 + sum(_VALUES_INCLUDED[name] for name in self.request.include)
         if self.request.targets is None:
             return columns * self.size.vertices
         return (columns + VALUES_OF_POINT) * len(self.request.targets)
@@ -100,65 +100,32 @@ class DistancesQuery(Query[DistancesRequest]):
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep once."""
-        request = self.request
-        sources, targets = self._parted(points)
-        starts = to_sources(opened.mesh, request.sources, sources)
+        request, mesh = self.request, opened.mesh
+        count = point_count(*request.sources)
+        sources, targets = points[:count], None if request.targets is None else points[count:]
+        starts = to_sources(mesh, request.sources, sources)
+        limit = request.max_distance
         field = solve_field(
-            opened,
-            request,
-            starts,
-            context,
-            max_distance=request.max_distance,
-            targets=targets or (),
+            opened, request, starts, context, max_distance=limit, targets=targets or ()
         )
         distances = _at(targets, field.distances, field.distance_at)
-        included: dict[str, NDArray[Any]] = {}
-        if "nearest_source" in self._included:
+        members = self.members(
+            opened,
+            method=request.method,
+            error_bound=bound_of(field.error_bound),
+            sources=[describe_source(mesh, start) for start in starts],
+            **_described(mesh, targets),
+            distances=distances,
+            unreachable=_unreachable(mesh, sources, targets, distances),
+            stats=stats_of(field.stats),
+        )
+        included: dict[str, Any] = {}
+        if "nearest_source" in request.include:
             nearest = _at(targets, field.nearest_source, field.nearest_source_at)
-            included["nearest_source"] = nearest
-        if "gradient" in self._included:
+            included["nearest_source"] = Indices(nearest)
+        if "gradient" in request.include:
             included["gradient"] = field.gradient
-        bound, stats = bound_of(field.error_bound), stats_of(field.stats)
-        return self._answer(opened, points, starts, distances, included, bound, stats)
-
-    @property
-    def _included(self) -> Sequence[str]:
-        return self.request.include
-
-    def _parted(self, points: SurfacePoints) -> tuple[SurfacePoints, SurfacePoints | None]:
-        """Return sources and targets, None where those are all vertices."""
-        count = point_count(*self.request.sources)
-        return points[:count], None if self.request.targets is None else points[count:]
-
-    def _answer(
-        self,
-        opened: OpenMesh,
-        points: SurfacePoints,
-        starts: Sequence[gc.Source],
-        distances: NDArray[np.float64],
-        included: Mapping[str, NDArray[Any]],
-        error_bound: Mapping[str, Any],
-        stats: Mapping[str, Any],
-    ) -> Answer:
-        mesh = opened.mesh
-        sources, targets = self._parted(points)
-        members: dict[str, Any] = {
-            "kind": self.kind,
-            "mesh_id": self.mesh_id,
-            "method": self.request.method,
-            "error_bound": error_bound,
-            "sources": [describe_source(mesh, start) for start in starts],
-        }
-        if targets is not None:
-            members["targets"] = [describe_point(mesh, point) for point in targets]
-        members |= {
-            "distances": distances,
-            "unreachable": _unreachable(mesh, sources, targets, distances),
-            "stats": stats,
-            "warnings": opened.warnings,
-        }
-        for name, array in included.items():
-            members[name] = Indices(array) if name == "nearest_source" else array
+        members |= included
         columns = columns_of(members)
         return Answer(
             members,
@@ -167,6 +134,13 @@ class DistancesQuery(Query[DistancesRequest]):
             table=table_of_distances("vertex" if targets is None else "target", columns),
             surface=surface_of(mesh, columns) if targets is None else None,
         )
+
+
+def _described(mesh: gc.TriangleMesh, targets: SurfacePoints | None) -> dict[str, Any]:
+    """Return the member for targets; none where they are all vertices."""
+    if targets is None:
+        return {}
+    return {"targets": [describe_point(mesh, point) for point in targets]}
 
 
 def _at(

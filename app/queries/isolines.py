@@ -1,7 +1,6 @@
 """Lines of equal distance."""
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from app.queries.accuracy import (
     with_default_accuracy,
 )
 from app.queries.base import ExecutionContext, Query
-from app.queries.cost_model import FACES_ON_LEVEL, PER_FACE_CROSSED, share_reached, sweep_seconds
+from app.queries.cost_model import PER_FACE_CROSSED, faces_crossed, share_reached, sweep_seconds
 from app.queries.lines import (
     OFFERS,
     VALUES_OF_LINE_POINT,
@@ -78,12 +77,12 @@ class IsolinesQuery(Query[IsolinesRequest]):
         return points_in_sources(self.request.sources)
 
     def rough_seconds(self) -> float:
-        """Return the cost of a sweep to the limit, and of the lines."""
+        """Return the cost of two sweeps to the limit, and of the lines."""
         request = self.request
         share = share_reached(self.size, point_count(*request.sources), request.max_distance)
-        crossed = min(1.0, self._level_count * FACES_ON_LEVEL / math.sqrt(self.size.faces)) * share
-        sweep = sweep_seconds(self.size.faces, request, share, crossed=crossed)
-        return sweep + PER_FACE_CROSSED * crossed * self.size.faces
+        sweep = sweep_seconds(self.size.faces, request, share)
+        crossed = faces_crossed(self.size.faces, self._level_count, share)
+        return 2 * sweep + PER_FACE_CROSSED * crossed
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep, then draw level by level, as long as the lines fit into the answer."""
@@ -106,8 +105,16 @@ class IsolinesQuery(Query[IsolinesRequest]):
             values += VALUES_OF_LINE_POINT * sum(len(line.points) for line in lines)
             check_json_size(values, context.max_values, self.hint)
             found.append(describe_level(level, lines))
-        bound, stats = bound_of(field.error_bound), stats_of(field.stats)
-        return self._answer(opened, starts, chord_error, found, bound, stats)
+        members = self.members(
+            opened,
+            method=self.request.method,
+            error_bound=bound_of(field.error_bound),
+            chord_error=chord_error,
+            sources=[describe_source(opened.mesh, start) for start in starts],
+            isolines=found,
+            stats=stats_of(field.stats),
+        )
+        return Answer(members, shown=("isolines",), lines=lambda: lines_of(found))
 
     @property
     def _level_count(self) -> int:
@@ -124,31 +131,6 @@ class IsolinesQuery(Query[IsolinesRequest]):
         except gc.errors.InvalidArgument as error:
             raise invalid_fields(["/count"], str(error)) from None
         return [float(level) for level in levels]
-
-    def _answer(
-        self,
-        opened: OpenMesh,
-        starts: Sequence[gc.Source],
-        chord_error: float,
-        found: Sequence[Mapping[str, Any]],
-        error_bound: Mapping[str, Any],
-        stats: Mapping[str, Any],
-    ) -> Answer:
-        return Answer(
-            {
-                "kind": self.kind,
-                "mesh_id": self.mesh_id,
-                "method": self.request.method,
-                "error_bound": error_bound,
-                "chord_error": chord_error,
-                "sources": [describe_source(opened.mesh, start) for start in starts],
-                "isolines": found,
-                "stats": stats,
-                "warnings": opened.warnings,
-            },
-            shown=("isolines",),
-            lines=lambda: lines_of(found),
-        )
 
 
 def describe_level(level: float, lines: Sequence[gc.Isoline]) -> dict[str, Any]:
