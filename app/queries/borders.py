@@ -5,9 +5,10 @@ from typing import Any
 
 import geodesic_core as gc
 from app.encoding import Answer
-from app.queries.accuracy import affinity_keys_of, solve_field, stats_of
-from app.queries.base import ExecutionContext, Query
-from app.queries.cost_model import PER_FACE_DIVIDED, faces_crossed, share_reached, sweep_seconds
+from app.queries.accuracy import solve_field, stats_of
+from app.queries.base import ExecutionContext
+from app.queries.cost_model import PER_FACE_DIVIDED, faces_crossed, sweep_seconds
+from app.queries.from_sources import FromSources
 from app.queries.lines import (
     OFFERS,
     VALUES_OF_LINE_POINT,
@@ -17,24 +18,19 @@ from app.queries.lines import (
 from app.queries.points import (
     SurfacePoints,
     describe_source,
-    point_count,
-    points_in_sources,
     to_sources,
 )
 from app.queries.validation import (
-    WrittenPoints,
-    check_count,
     check_json_size,
 )
 from app.queries.views import lines_of_borders
 from app.schemas.requests import Accuracy, BordersRequest
-from app.settings import Settings
 from app.store.meshes import OpenMesh
 
 EXACT = Accuracy()
 
 
-class BordersQuery(Query[BordersRequest]):
+class BordersQuery(FromSources[BordersRequest]):
     """The points that are equally near to two of ``sources``, as polylines."""
 
     kind = "borders"
@@ -42,26 +38,12 @@ class BordersQuery(Query[BordersRequest]):
     offers = OFFERS
     hint = "set a larger chord_error, or a max_distance"
 
-    def check_limits(self, settings: Settings) -> None:
-        """Refuse too many sources."""
-        check_count("sources", point_count(*self.request.sources), settings, "max_sources")
-
-    @property
-    def affinity_keys(self) -> tuple[str, ...]:
-        """The exact field of these sources, and the mesh."""
-        return affinity_keys_of(self, self.request.sources)
-
-    def written_points(self) -> WrittenPoints:
-        """Yield the sources."""
-        return points_in_sources(self.request.sources)
-
     def rough_seconds(self) -> float:
         """Return the cost of two sweeps to the limit, and of the lines."""
         request = self.request
-        share = share_reached(self.size, point_count(*request.sources), request.max_distance)
         lines = math.sqrt(len(request.sources) - 1)  # as the length of all borders grows
-        sweep = sweep_seconds(self.size.faces, EXACT, share)
-        return 2 * sweep + PER_FACE_DIVIDED * faces_crossed(self.size.faces, lines, share)
+        sweep = sweep_seconds(self.size.faces, EXACT, self.share)
+        return 2 * sweep + PER_FACE_DIVIDED * faces_crossed(self.size.faces, lines, self.share)
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep, then draw the borders, if they fit into the answer."""

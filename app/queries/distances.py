@@ -11,14 +11,14 @@ import geodesic_core as gc
 from app.encoding import CSV, JSON, NPY, OCTETS, PLY, Answer, Indices
 from app.errors import Fault, problem
 from app.queries.accuracy import (
-    affinity_keys_of,
     bound_of,
     solve_field,
     stats_of,
     with_default_accuracy,
 )
-from app.queries.base import VALUES_OF_POINT, ExecutionContext, Query
-from app.queries.cost_model import PER_POINT, share_reached, sweep_seconds
+from app.queries.base import VALUES_OF_POINT, ExecutionContext
+from app.queries.cost_model import PER_POINT, sweep_seconds
+from app.queries.from_sources import FromSources
 from app.queries.points import (
     SurfacePoints,
     components_of,
@@ -26,21 +26,18 @@ from app.queries.points import (
     describe_point,
     describe_source,
     numbered,
-    point_count,
-    points_in_sources,
     to_sources,
 )
-from app.queries.validation import WrittenPoints, check_count, invalid_fields
+from app.queries.validation import WrittenPoints, invalid_fields
 from app.queries.views import columns_of, surface_of, table_of_distances
 from app.schemas.requests import DistancesRequest
-from app.settings import Settings
 from app.store.meshes import OpenMesh
 
 _VALUES_INCLUDED = {"nearest_source": 1, "gradient": 3}
 """Values in JSON for each distance, by name."""
 
 
-class DistancesQuery(Query[DistancesRequest]):
+class DistancesQuery(FromSources[DistancesRequest]):
     """Distances from ``sources`` to all vertices, or to ``targets`` only."""
 
     kind = "distances"
@@ -54,10 +51,6 @@ class DistancesQuery(Query[DistancesRequest]):
             raise invalid_fields(["/include"], message)
         included = list(dict.fromkeys(request.include))
         return with_default_accuracy(request.model_copy(update={"include": included}))
-
-    def check_limits(self, settings: Settings) -> None:
-        """Refuse too many sources."""
-        check_count("sources", point_count(*self.request.sources), settings, "max_sources")
 
     @property
     def offers(self) -> Sequence[str]:
@@ -78,30 +71,20 @@ class DistancesQuery(Query[DistancesRequest]):
             return columns * self.size.vertices
         return (columns + VALUES_OF_POINT) * len(self.request.targets)
 
-    @property
-    def affinity_keys(self) -> tuple[str, ...]:
-        """The field of these sources, and the mesh."""
-        return affinity_keys_of(self, self.request.sources)
-
     def written_points(self) -> WrittenPoints:
         """Yield the sources, then the targets."""
-        request = self.request
-        return chain(
-            points_in_sources(request.sources), numbered("/targets", request.targets or ())
-        )
+        return chain(super().written_points(), numbered("/targets", self.request.targets or ()))
 
     def rough_seconds(self) -> float:
         """Return the cost of a sweep to the limit."""
         request = self.request
-        sources = point_count(*request.sources)
-        share = share_reached(self.size, sources, request.max_distance)
-        points = sources + len(request.targets or ())
-        return sweep_seconds(self.size.faces, request, share) + PER_POINT * points
+        points = self.source_count + len(request.targets or ())
+        return sweep_seconds(self.size.faces, request, self.share) + PER_POINT * points
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep once."""
         request, mesh = self.request, opened.mesh
-        count = point_count(*request.sources)
+        count = self.source_count
         sources, targets = points[:count], None if request.targets is None else points[count:]
         starts = to_sources(mesh, request.sources, sources)
         limit = request.max_distance

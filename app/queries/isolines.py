@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 import geodesic_core as gc
 from app.encoding import Answer
 from app.queries.accuracy import (
-    affinity_keys_of,
     bound_of,
     solve_field,
     stats_of,
     with_default_accuracy,
 )
-from app.queries.base import ExecutionContext, Query
-from app.queries.cost_model import PER_FACE_CROSSED, faces_crossed, share_reached, sweep_seconds
+from app.queries.base import ExecutionContext
+from app.queries.cost_model import PER_FACE_CROSSED, faces_crossed, sweep_seconds
+from app.queries.from_sources import FromSources
 from app.queries.lines import (
     OFFERS,
     VALUES_OF_LINE_POINT,
@@ -26,12 +26,9 @@ from app.queries.lines import (
 from app.queries.points import (
     SurfacePoints,
     describe_source,
-    point_count,
-    points_in_sources,
     to_sources,
 )
 from app.queries.validation import (
-    WrittenPoints,
     check_count,
     check_json_size,
     invalid_fields,
@@ -45,7 +42,7 @@ _VALUES_OF_LEVEL = 1
 """Values in JSON of a level itself."""
 
 
-class IsolinesQuery(Query[IsolinesRequest]):
+class IsolinesQuery(FromSources[IsolinesRequest]):
     """The points at some distances from ``sources``, as polylines."""
 
     kind = "isolines"
@@ -64,24 +61,14 @@ class IsolinesQuery(Query[IsolinesRequest]):
 
     def check_limits(self, settings: Settings) -> None:
         """Refuse too many sources or levels."""
-        check_count("sources", point_count(*self.request.sources), settings, "max_sources")
+        super().check_limits(settings)
         check_count("levels", self._level_count, settings, "max_levels")
-
-    @property
-    def affinity_keys(self) -> tuple[str, ...]:
-        """The field of these sources, and the mesh."""
-        return affinity_keys_of(self, self.request.sources)
-
-    def written_points(self) -> WrittenPoints:
-        """Yield the sources."""
-        return points_in_sources(self.request.sources)
 
     def rough_seconds(self) -> float:
         """Return the cost of two sweeps to the limit, and of the lines."""
         request = self.request
-        share = share_reached(self.size, point_count(*request.sources), request.max_distance)
-        sweep = sweep_seconds(self.size.faces, request, share)
-        crossed = faces_crossed(self.size.faces, self._level_count, share)
+        sweep = sweep_seconds(self.size.faces, request, self.share)
+        crossed = faces_crossed(self.size.faces, self._level_count, self.share)
         return 2 * sweep + PER_FACE_CROSSED * crossed
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
