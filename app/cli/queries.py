@@ -17,14 +17,12 @@ from app.cli.arguments import (
     NO_MERGE,
     AbsoluteError,
     Barriers,
-    BoundedMethod,
     BoundedMethodOption,
     EffortOption,
     FormatOption,
     MaxDistance,
     MergeOption,
     MeshFile,
-    Method,
     MethodOption,
     PointOrCurveSource,
     PointOrCurveSources,
@@ -80,7 +78,7 @@ _ERRORS: Options = {
     "absolute_error": (AbsoluteError, None),
 }
 _ACCURACY: Options = {
-    "method": (MethodOption, Method.EXACT),
+    "method": (MethodOption, "exact"),
     **_ERRORS,
     "effort": (EffortOption, None),
 }
@@ -158,7 +156,7 @@ _NO_PATH = {
 
 
 def _without_via(given: Given) -> dict[str, Any]:
-    if given["method"] is not Method.EXACT and given["via"]:
+    if given["method"] != "exact" and given["via"]:
         raise typer.BadParameter("--via goes with --method exact only")
     return {}
 
@@ -331,7 +329,7 @@ COMMANDS = {
                 None,
             ),
             **_CHORD_ERROR,
-            "method": (BoundedMethodOption, BoundedMethod.EXACT),
+            "method": (BoundedMethodOption, "exact"),
             **_ERRORS,
             **_REACH,
         },
