@@ -166,13 +166,6 @@ def test_components_without_a_source_have_no_lines(client: TestClient, apart: st
     assert set(line["faces"]) == {0}
 
 
-@pytest.mark.usefixtures("one_replica")
-def test_the_same_lines_are_not_drawn_again(client: TestClient, knot: str) -> None:
-    first, again = (isolines(client, knot, count=2, max_distance=3.5) for _ in range(2))
-
-    assert (again.content, again.headers["server-timing"]) == (first.content, "kept")
-
-
 @pytest.mark.parametrize(
     ("change", "place"),
     [

@@ -11,7 +11,7 @@ import geodesic_core as gc
 from app.queries import LocateQuery
 from app.store.meshes import OpenMesh
 from geodesic_core.mesh.closest_point import NearestFace
-from tests.support.service import NPY, check_problem, context, serving, stored_mesh, upload_sample
+from tests.support.service import check_problem, context, serving, stored_mesh, upload_sample
 
 
 def locate(client: TestClient, mesh_id: str, headers: Any = None, **body: Any) -> Any:
@@ -97,15 +97,6 @@ def test_found_points_are_points_of_queries(client: TestClient, knot: str) -> No
     assert by_echo.json()["length"] == gc.shortest_path(mesh, mesh.locate(position), 0).length
 
 
-@pytest.mark.usefixtures("one_replica")
-def test_the_same_points_are_not_looked_for_again(client: TestClient, knot: str) -> None:
-    first, again = (locate(client, knot, points=[[0, 0, 0.125]]) for _ in range(2))
-
-    assert again.content == first.content
-    assert again.headers["server-timing"] == "kept"
-    assert again.headers["cache-control"] == "no-store"
-
-
 @pytest.mark.parametrize(
     ("body", "code", "places"),
     [
@@ -128,23 +119,6 @@ def test_refused_bodies(
     problem = check_problem(locate(client, apart, **body), 422, code)
 
     assert [fault["pointer"] for fault in problem["errors"]] == places
-
-
-def test_it_does_not_come_as_an_array(client: TestClient, apart: str) -> None:
-    link, body = f"/v1/meshes/{apart}/locate", {"points": [[0, 0, 0]]}
-    for response in (
-        locate(client, apart, NPY, **body),
-        locate(client, apart, {"Accept": "application/octet-stream"}, **body),
-        locate(client, apart, {"Accept": "text/html"}, **body),
-        client.post(f"{link}?format=npy", json=body),
-        client.post(f"{link}?format=octets", json=body),
-    ):
-        problem = check_problem(response, 406, "not_acceptable")
-        assert problem["detail"] == "this answer is available as application/json, text/csv"
-    for headers in ({"Accept": "*/*"}, {"Accept": "application/x-npy, application/json;q=0.1"}):
-        assert locate(client, apart, headers, **body).status_code == 200
-    assert client.post(f"{link}?format=json", json=body).status_code == 200
-    check_problem(client.post(f"{link}?format=xml", json=body), 422, "invalid_request")
 
 
 def test_a_mesh_that_is_not_there(client: TestClient) -> None:
