@@ -10,8 +10,6 @@ from starlette.testclient import TestClient
 import geodesic_core as gc
 from tests.support.service import check_problem, distances, stored_mesh, upload_sample
 
-ROUNDING = 1e-9
-SOURCES = [{"vertex": 3}, {"vertex": 400, "start_distance": 0.25}]
 ENDS = {"source": {"vertex": 3}, "target": {"vertex": 700}}
 WRITTEN_ENDS = "from=v3&to=v700"
 

@@ -13,8 +13,6 @@ EFFORTS = 1, 2, 4, 8
 ROUNDING = 1e-9
 SOURCES = [{"vertex": 3}, {"vertex": 400, "start_distance": 0.25}]
 ENDS = {"source": {"vertex": 3}, "target": {"vertex": 700}}
-INSIDE = {"face": 40, "barycentric": [0.2, 0.3, 0.5]}
-CURVE = {"polyline": [{"vertex": 3}, {"vertex": 3}]}
 
 
 @pytest.fixture(scope="module")

@@ -54,17 +54,6 @@ def test_distances_are_the_library_s(client: TestClient, knot: str, table: np.nd
     assert {end["component"] for end in answer["sources"] + answer["targets"]} == {0}
 
 
-def test_rows_are_those_of_single_queries(client: TestClient, knot: str) -> None:
-    rows = [
-        client.post(
-            f"/v1/meshes/{knot}/distances", json={"sources": [source], "targets": TARGETS}
-        ).json()["distances"]
-        for source in SOURCES
-    ]
-
-    np.testing.assert_allclose(matrix(client, knot).json()["distances"], rows, rtol=1e-12)
-
-
 @pytest.mark.parametrize("name", ["npy", "octets"])
 def test_a_dense_matrix_in_binary(
     client: TestClient, knot: str, table: np.ndarray, name: str
