@@ -1,7 +1,7 @@
 """HTTP/1.1 on a connection: what a service on loopback needs; the rest is a proxy's.
 
 Heads are bounded in size and time, connections in number. A proxy in front of the service holds
-clients that send or read slowly, and joins tiny chunks, see `docs/operations.md`.
+clients that send or read slowly, see `docs/operations.md`.
 """
 
 import asyncio
@@ -20,6 +20,14 @@ MOST_HEAD_BYTES = 32 * 1024
 """Largest request line and headers together; trailers count as well."""
 BYTES_BESIDE_HEADER = 32
 """Counted for each header beside its name and value, as in HTTP/2: short ones take as long."""
+MOST_PIPELINED = 16
+"""Requests of one connection that may wait for the answer to the one before.
+
+Thousands of them, which come in one read, would hold all other callers for half a second.
+"""
+LEAST_CHUNK = 64
+"""Least mean size of a body's chunks, once there are `FREE_CHUNKS`: each takes as long to parse."""
+FREE_CHUNKS = 1000
 HEAD_S = 10.0
 """Seconds until a head must be complete."""
 LINGER_S = 1.0
@@ -44,6 +52,7 @@ class BoundedHttpProtocol(HttpToolsProtocol):
         self._is_in_head = False
         self._unparsed_bytes = 0
         """Received since the parser came to the end of a head, or to a part of a body"""
+        self._chunks = self._body_bytes = 0
         self._head_timer: TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
@@ -87,6 +96,9 @@ class BoundedHttpProtocol(HttpToolsProtocol):
     def on_message_begin(self) -> None:
         """Begin a head."""
         self._is_in_head = True
+        self._chunks = self._body_bytes = 0
+        if len(self.pipeline) >= MOST_PIPELINED:
+            raise ValueError("too many requests at once on one connection")
         super().on_message_begin()
 
     def on_headers_complete(self) -> None:
@@ -107,7 +119,16 @@ class BoundedHttpProtocol(HttpToolsProtocol):
     def on_body(self, body: bytes) -> None:
         """Take a part of the body."""
         self._unparsed_bytes = 0
+        self._body_bytes += len(body)
         super().on_body(body)
+
+    def on_chunk_header(self) -> None:
+        """Begin a chunk of the body, unless those before it were too small."""
+        if self._chunks > FREE_CHUNKS and self._body_bytes < LEAST_CHUNK * self._chunks:
+            detail = f"the chunks of the body have fewer than {LEAST_CHUNK} bytes on average"
+            self._refusal = Problem("malformed_request", detail, limit=LEAST_CHUNK)
+            raise ValueError(detail)
+        self._chunks += 1
 
     # Refusals
 

@@ -12,8 +12,11 @@ from structlog.testing import capture_logs
 from app.http import connections, protocol
 from app.http.protocol import (
     BYTES_BESIDE_HEADER,
+    FREE_CHUNKS,
+    LEAST_CHUNK,
     MOST_DRAINED,
     MOST_HEAD_BYTES,
+    MOST_PIPELINED,
 )
 from app.settings import Settings
 from tests.support.listening import Listener, listening, read_answer
@@ -132,9 +135,21 @@ def test_bodies_do_not_count(listener: Listener) -> None:
     head = b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: " + length + b"\r\n\r\n"
     assert listener.send(head + body).status_code == 200
     assert listener.bodies[-1] == body
-    chunks = b"8\r\nxxxxxxxx\r\n" * (len(body) // 8)
+    chunks = (b"%x\r\n%s\r\n" % (LEAST_CHUNK, b"x" * LEAST_CHUNK)) * (len(body) // LEAST_CHUNK)
     assert listener.send(CHUNKED + chunks + b"0\r\n\r\n").status_code == 200
     assert listener.bodies[-1] == body
+
+
+@pytest.mark.parametrize("excess", [0, 1])
+def test_chunks_of_a_few_bytes_are_refused_where_there_are_many(
+    listener: Listener, excess: int
+) -> None:
+    chunks = b"1\r\na\r\n" * (FREE_CHUNKS + excess)
+    response = listener.send(CHUNKED + chunks + b"0\r\n\r\n")
+    if excess:
+        assert check_problem(response, 400, "malformed_request")["limit"] == LEAST_CHUNK
+    else:
+        assert (response.status_code, listener.bodies[-1]) == (200, b"a" * FREE_CHUNKS)
 
 
 # Time
@@ -186,9 +201,22 @@ def test_an_answer_under_way_is_not_cut_off(listener: Listener) -> None:
 
 
 def test_pipelined_requests_are_answered_in_order(listener: Listener) -> None:
-    requests = [b"GET /?%d HTTP/1.1\r\nHost: localhost\r\n\r\n" % n for n in range(100)]
+    requests = [b"GET /?%d HTTP/1.1\r\nHost: localhost\r\n\r\n" % n for n in range(MOST_PIPELINED)]
     with listener.connect(b"".join(requests)) as connection:
-        assert [read(connection) for _ in requests] == [str(n) for n in range(100)]
+        assert [read(connection) for _ in requests] == [str(n) for n in range(MOST_PIPELINED)]
+
+
+def test_too_many_pipelined_requests_end_the_connection(listener: Listener) -> None:
+    gate = b"GET /gate?first HTTP/1.1\r\nHost: localhost\r\n\r\n"
+    listener.parsed_bytes.clear()
+    with listener.connect(gate + WHOLE * 10_000) as connection:
+        wait_until(lambda: listener.parsed_bytes)
+        assert is_alive(listener)
+        listener.open_gate()
+        assert read(connection) == "first"
+        assert [read(connection) for _ in range(MOST_PIPELINED)] == ["answer"] * MOST_PIPELINED
+        assert ends(connection)
+    listener.gate.clear()
 
 
 def read(connection: socket.socket) -> str:
