@@ -61,9 +61,9 @@ def copies_of(service: ServiceClient) -> set[str]:
 
 def drop_copies(service: ServiceClient) -> None:
     """Have the service pull each mesh again, as another machine would."""
-    meshes = service.app.state.service.store.meshes  # type: ignore[attr-defined]
+    supply = service.app.state.service.store.supply  # type: ignore[attr-defined]
     for mesh_id in copies_of(service):
-        anyio.run(meshes.distrust, mesh_id)
+        anyio.run(supply.drop_copy, mesh_id)
 
 
 @both_providers
