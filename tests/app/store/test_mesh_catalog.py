@@ -34,7 +34,7 @@ from tests.support.service import (
     store_mesh,
     upload_sample,
 )
-from tests.support.waiting import LONG_S, wait_until
+from tests.support.waiting import LONG_S
 
 Opened = tuple[MeshStore, MeshCatalog]
 
@@ -285,40 +285,6 @@ def test_uploads_at_the_same_time_do_not_exceed_the_bound(tmp_path: Path) -> Non
         assert len(sizes_in(store[0])) == len(kinds) - len(refused) >= 1
         assert catalog.total == sum(sizes_in(store[0]).values()) <= room
         assert files_in(tmp_path / "store" / "tmp") == set()
-
-
-@pytest.mark.service
-def test_over_http(tmp_path: Path) -> None:
-    room = sum(sizes(tmp_path, 50, 72))
-    store = tmp_path / "store"
-    with serving(store, store_bytes=room) as client:
-        first = upload_sample(client, "plane", 50)
-        upload_sample(client, "plane", 72)
-        sample = {"sample": "plane", "faces": 32}
-        problem = check_problem(client.post("/v1/meshes", params=sample), 507, "storage_full")
-        assert (problem["limit"], problem["setting"]) == (room, "store_bytes")
-        assert problem["actual"] > room
-        assert files_in(store / "tmp") == set()
-        assert distances(client, first).status_code == 200, "as is used after the other"
-
-    with serving(store, store_bytes=room, store_evict="lru") as client:
-        job = client.post(
-            f"/v1/meshes/{first}/distances",
-            json={"sources": [{"vertex": 1}]},
-            headers={"Prefer": "respond-async"},
-        ).headers["location"]
-        wait_until(lambda: client.get(job).json()["status"] == "successful")
-        third = upload_sample(client, "plane", 32)
-        assert {mesh["id"] for mesh in client.get("/v1/meshes").json()["meshes"]} == {first, third}
-        client.get(f"/v1/meshes/{third}/arrays/faces")
-        for faces in (98, 18):
-            upload_sample(client, "plane", faces)
-
-        check_problem(client.get(f"/v1/meshes/{first}"), 404, "mesh_not_found")
-        assert client.get(f"{job}/results").status_code == 200, "a job keeps its answer"
-        assert len(list((store / "results" / first).glob("*.body"))) == 1
-        total = client.app.state.service.mesh_catalog.total
-        assert total == sum(sizes_in(MeshStore(store)).values()) <= room
 
 
 def test_a_mesh_removed_before_its_upload_ends_is_to_be_written_again(tmp_path: Path) -> None:
