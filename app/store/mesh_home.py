@@ -69,12 +69,16 @@ class MeshHome:
         self._limiter = CapacityLimiter(_CALLS)
 
     def found(self) -> Mapping[str, MeshRecord]:
-        """Return what is here, the least recently used first; remove what uploads left."""
-        return self._found(MESHES)
+        """Return what is here, the least recently used first; remove what uploads left.
+
+        It is for a start: later, other services may be writing what seems to be left.
+        """
+        return self._found(MESHES, True)
 
     async def record(self, mesh_id: str) -> MeshRecord | None:
         """Return the record of a mesh; None where it is not here."""
-        return (await self._call(self._found, f"{MESHES}/{mesh_id}")).get(mesh_id)
+        found = await self._call(self._found, f"{MESHES}/{mesh_id}", False)
+        return found.get(mesh_id)
 
     async def manifest(self, mesh_id: str) -> Mapping[str, Any]:
         """Return the manifest of a mesh, as it was here less than a second ago.
@@ -149,7 +153,7 @@ class MeshHome:
             del self._known[next(iter(self._known))]
         return now
 
-    def _found(self, folder: str) -> Mapping[str, MeshRecord]:
+    def _found(self, folder: str, removes: bool) -> Mapping[str, MeshRecord]:
         objects = list(self._objects.found(folder))
         ids = [mesh_of(each) for each in objects if each.name.endswith(f"/{MANIFEST}")]
         manifests = dict(zip(ids, self._read_all(ids), strict=True))
@@ -158,7 +162,7 @@ class MeshHome:
             mesh_id = mesh_of(each)
             if mesh_id in manifests and _is_named(each.name, manifests[mesh_id]):
                 sizes[mesh_id] += each.size
-            elif each.is_abandoned:
+            elif removes and each.is_abandoned:
                 self._objects.remove(each.name)
         return {
             mesh_id: MeshRecord(sizes[mesh_id], manifest["owner"] if manifest else None)
