@@ -46,7 +46,7 @@ def test_all_have_one_version_and_the_service_requires_that_of_the_library() -> 
 def test_all_ask_for_the_same_of_python_and_of_what_they_share() -> None:
     library, service = requirements(LIBRARY), requirements(SERVICE)
     shared = library.keys() & service.keys()
-    assert shared >= {"numpy", "scipy", "filelock"}
+    assert shared >= {"numpy", "scipy"}
     assert {name: library[name] for name in shared} == {name: service[name] for name in shared}
     assert requirements(CLIENT)["numpy"] == library["numpy"]
     pythons = {project(folder)["requires-python"] for folder in (LIBRARY, SERVICE, CLIENT)}

@@ -18,14 +18,13 @@ from starlette.testclient import TestClient
 from app.cli.arguments import SampleName
 from app.schemas import meshes as schemas
 from app.settings import Settings
-from app.store.manifests import MANIFEST, encode_manifest, read_manifest
+from app.store.mesh_home import MeshHome
 from geodesic_core import samples
 from geodesic_core.io.load import _READERS
 from tests.support.service import (
     ServiceClient,
     check_problem,
     serving,
-    store_mesh,
     stored_mesh,
     upload_sample,
 )
@@ -223,16 +222,6 @@ def test_the_name_of_a_mesh_comes_with_its_first_upload(
         assert listed.items() <= document.items()
 
 
-def test_a_mesh_that_an_earlier_release_stored_has_no_name(tmp_path: Path) -> None:
-    mesh_id = store_mesh(tmp_path, samples.plane(8))
-    path = tmp_path / "meshes" / mesh_id / MANIFEST
-    manifest = dict(read_manifest(str(path)))
-    del manifest["name"]
-    path.write_bytes(encode_manifest(manifest))
-    with serving(tmp_path) as client:
-        assert client.get(f"/v1/meshes/{mesh_id}").json()["name"] is None
-
-
 @pytest.mark.parametrize("name", ["", "x" * 256, "a\x1b[31mb", "a\x9bb", "a\n"])
 def test_names_that_are_refused(client: TestClient, name: str) -> None:
     response = client.post("/v1/meshes", params={"name": name}, json=TETRAHEDRON)
@@ -281,18 +270,6 @@ def test_what_is_no_way_of_merging(client: TestClient, merge: str) -> None:
     response = client.post("/v1/meshes", params={"merge": merge}, json=APART)
     problem = check_problem(response, 422, "invalid_request")
     assert {error["pointer"] for error in problem["errors"]} == {"/query/merge"}
-
-
-def test_a_mesh_of_an_earlier_release_has_no_report_of_seams(tmp_path: Path) -> None:
-    mesh_id = store_mesh(tmp_path, samples.plane(2))
-    path = tmp_path / "meshes" / mesh_id / MANIFEST
-    manifest = dict(read_manifest(str(path)))
-    new = ["near_vertices", "near_distance", "t_junctions", "t_junction_edges"]
-    manifest["report"] = {k: v for k, v in manifest["report"].items() if k not in new}
-    path.write_bytes(encode_manifest(manifest))
-    with serving(tmp_path) as client:
-        document = client.get(f"/v1/meshes/{mesh_id}").json()
-    assert [document[name] for name in new] == [None] * 4
 
 
 QUADS = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv 1 9 0\nf 1 2 3 4\nf 1 1 2\nf 4 3 5\nl 1 2"
@@ -744,31 +721,18 @@ def test_a_damaged_mesh_does_not_hide_the_others(tmp_path: Path) -> None:
         check_problem(client.get(f"/v1/meshes/{damaged}"), 500, "mesh_damaged")
 
 
-def test_damage_is_reported(tmp_path: Path) -> None:
-    with serving(tmp_path) as client:
-        mesh_id = upload_sample(client, "plane", 100)
-        array = tmp_path / "meshes" / mesh_id / "vertices.npy"
-        array.write_bytes(array.read_bytes()[:-1] + b"!")
-
-        query = {"sources": [{"vertex": 0}]}
-        response = client.post(f"/v1/meshes/{mesh_id}/distances", json=query)
-
-        problem = check_problem(response, 500, "mesh_damaged")
-        assert "vertices" in problem["detail"]
-        assert "upload it again" in problem["hint"]
-
-
 def test_a_list_reads_its_manifests_beside_the_event_loop(
     client: ServiceClient, plane: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A thousand of them are a thousand files."""
     readers: set[int] = set()
+    read = MeshHome._readable
 
-    def noted(path: str) -> Any:
+    def noted(home: MeshHome, mesh_id: str) -> Any:
         readers.add(threading.get_ident())
-        return read_manifest(path)
+        return read(home, mesh_id)
 
-    monkeypatch.setattr("app.store.meshes.manifest_of", noted)
+    monkeypatch.setattr(MeshHome, "_readable", noted)
     listed = client.get("/v1/meshes", params={"limit": 1000}).json()["meshes"]
     assert plane in {mesh["id"] for mesh in listed}
     assert readers

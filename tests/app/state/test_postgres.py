@@ -11,8 +11,8 @@ import pytest
 
 from app.errors import StateUnavailableError, problem_of
 from app.state import Allowances, MeshRecords, StateError
-from app.store.folder_meshes import FolderMeshes
 from app.store.mesh_catalog import MeshCatalog
+from app.store.store import Store
 from tests.support.databases import opened
 from tests.support.paths import ROOT
 from tests.support.postgres import SECRET, Server
@@ -133,7 +133,7 @@ def test_those_who_wait_for_the_meshes_leave_connections_to_others(
     url = postgres.new_database()
     ours, others = PostgresDatabase(url), PostgresDatabase(url)
     ours.prepare()
-    catalog = MeshCatalog(FolderMeshes(tmp_path), 2**30, evicts=True, shared=MeshRecords(ours))
+    catalog = MeshCatalog(Store(tmp_path).meshes, 2**30, evicts=True, shared=MeshRecords(ours))
 
     async def wait_for_meshes() -> None:
         with suppress(StateUnavailableError):  # it may take too long
