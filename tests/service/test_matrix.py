@@ -300,7 +300,7 @@ def test_pairs_need_targets(client: TestClient, knot: str) -> None:
     response = client.post(f"/v1/meshes/{knot}/matrix", json={"sources": [0, 1], "layout": "pairs"})
 
     problem = check_problem(response, 422, "invalid_request")
-    assert [fault["pointer"] for fault in problem["errors"]] == ["/targets"]
+    assert [fault["pointer"] for fault in problem["errors"]] == ["/layout"]
     assert "one for each source" in problem["detail"]
 
 

@@ -91,7 +91,7 @@ def test_lists_may_stand_anywhere(form: str, uneven: bool) -> None:
 @every_form
 @pytest.mark.parametrize(
     ("behind", "words"),
-    [(b"\n", ""), (b"\r\n\r\n", ""), (b"7 7 7\n", "1 row|5 bytes"), (bytes(64), "1 row|64 byt")],
+    [(b"\n", ""), (b"\r\n\r\n", ""), (b"7 7 7\n", "1 row|6 bytes"), (bytes(64), "1 row|64 byt")],
 )
 def test_what_lies_behind_the_last_element_is_left_out(
     form: str, behind: bytes, words: str
