@@ -223,7 +223,7 @@ def test_a_job_waits_for_a_store_that_is_away(service: ServiceClient, s3: S3, wi
             stack.enter_context(s3.away())  # before the work is done
         link = job.headers["location"]
         wait_until(lambda: any(line["event"].startswith("job waits") for line in lines))
-        assert service.get(link).json()["status"] == "running"
+        assert service.get(link).json()["finished"] is None
     wait_until(lambda: service.get(link).json()["finished"])
     assert service.get(f"{link}/results").content == distances(service, mesh_id, LONG).content
 

@@ -62,8 +62,9 @@ def test_the_database_of_jobs_cannot_be_written_for_a_while(tmp_path: Path) -> N
                 check_problem(server.client.delete(done), 507, "storage_full")
                 assert server.client.get(f"{done}/results").status_code == 200
                 check_problem(server.client.post(f"{running}/cancel"), 507, "storage_full")
-                assert get(running) == "dismissed"
+                assert get(running) == "accepted"
                 assert not read_jobs(database)[1].is_finished
+            assert server.client.post(f"{running}/cancel").status_code == 200
         assert submit(server, mesh_id, 2).status_code == 202
         assert server.client.delete(done).status_code == 200
         server.process.send_signal(signal.SIGTERM)
