@@ -253,7 +253,6 @@ def carrier(mesh, point) -> int:
     return sum(weight > 0 for weight in mesh.point(point).barycentric)
 
 
-@pytest.mark.parametrize(("share", "corners"), [(0.9, 2), (1.1, 3)])
 def test_paths_to_points_are_found_where_vertices_lie_beyond_the_limit():
     """Beside an edge of three faces, all of whose vertices but one are beyond it."""
     corners = [[0, 0, 0], [1, 0, 0], [0.2, 1, 0], [0.5, 0, 1], [0.8, -1, 0]]
@@ -271,6 +270,7 @@ def test_paths_to_points_are_found_where_vertices_lie_beyond_the_limit():
             check_path(mesh, path, source, target, exact)
 
 
+@pytest.mark.parametrize(("share", "corners"), [(0.9, 2), (1.1, 3)])
 def test_weight_divides_what_is_on_an_edge_from_what_is_inside(cube, share, corners):
     small = share * WEIGHT
     point = gc.SurfacePoint.face(1, (0.5 - small, small, 0.5))
