@@ -327,7 +327,7 @@ def _make_mesh(
         case MeshFromFile(path=path):
             max_bytes = most_unpacked(path.stat().st_size, settings.max_upload_bytes)
             try:
-                return gc.load_mesh(
+                mesh = gc.load_mesh(
                     path,
                     mesh_input.file_type,
                     mesh_input.merge,
@@ -338,6 +338,12 @@ def _make_mesh(
                 )
             except gc.errors.FileTooLarge:
                 raise too_large_unpacked(max_bytes, settings.max_upload_bytes) from None
+            if not mesh.has_positions:
+                raise gc.errors.InvalidMesh(
+                    "the NPZ file has no vertices, whose positions answers tell: add them",
+                    kind="vertex",
+                )
+            return mesh
     if len(faces) > max_faces:
         raise gc.errors.TooManyFaces(len(faces), max_faces)
     if len(vertices) > max_vertices:

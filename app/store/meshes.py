@@ -56,7 +56,7 @@ PUBLIC_ARRAYS = {
 
 _ID_BYTES = 16
 _ID = re.compile(f"[0-9a-f]{{{2 * _ID_BYTES}}}")
-_DEFINING_ARRAYS = ("vertices", "faces", "vertex_map", "face_map")
+_DEFINING_ARRAYS = ("vertices", "faces", "vertex_map", "face_map", "lengths")
 
 
 @dataclass(frozen=True)

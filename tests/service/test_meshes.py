@@ -15,6 +15,7 @@ import pytest
 from nibabel.gifti import GiftiDataArray, GiftiImage
 from starlette.testclient import TestClient
 
+import geodesic_core as gc
 from app.cli.arguments import SampleName
 from app.schemas import meshes as schemas
 from app.settings import Settings
@@ -144,6 +145,32 @@ def test_the_service_reads_what_the_library_reads(client: TestClient) -> None:
     formats = list(_READERS)
     assert list(schemas.MESH_FORMATS) == formats
     assert client.get("/v1").json()["mesh_formats"] == [*formats, "json"]
+
+
+def test_a_surface_may_be_given_by_its_lengths(client: TestClient) -> None:
+    mesh, archive = gc.samples.plane(8), BytesIO()
+    corners = mesh.vertices[mesh.faces]
+    lengths = 3.0 * np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    np.savez(archive, faces=mesh.faces, lengths=lengths, vertices=mesh.vertices)
+    made = client.post("/v1/meshes", params={"format": "npz"}, content=archive.getvalue())
+    assert made.status_code == 201
+    plain = client.post("/v1/meshes", content=off_of(mesh), params={"format": "off"})
+    assert plain.json()["id"] != made.json()["id"]
+    answer = client.post(f"/v1/meshes/{made.json()['id']}/distances", json={"sources": [0]})
+    exact = 3.0 * gc.exact_distance(mesh, 0).distances
+    np.testing.assert_allclose(answer.json()["distances"], exact, atol=1e-12)
+
+    alone = BytesIO()
+    np.savez(alone, faces=mesh.faces, lengths=lengths)
+    refused = client.post("/v1/meshes", params={"format": "npz"}, content=alone.getvalue())
+    problem = check_problem(refused, 422, "invalid_mesh")
+    assert "has no vertices" in problem["detail"]
+
+
+def off_of(mesh: gc.TriangleMesh) -> str:
+    rows = [" ".join(map(repr, row)) for row in mesh.vertices.tolist()]
+    rows += [f"3 {a} {b} {c}" for a, b, c in mesh.faces.tolist()]
+    return "\n".join(["OFF", f"{len(mesh.vertices)} {len(mesh.faces)} 0", *rows, ""])
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,8 @@ import geodesic_core as gc
 from geodesic_core.errors import InvalidArgument, InvalidPoint
 from geodesic_core.fields.path import reversed_path
 from geodesic_core.kernels.mesh.half_edges import FANS
+from geodesic_core.mesh.transport import is_straight
+from geodesic_core.tolerances import STRAIGHT_THROUGH
 from tests.core.fields.test_log_map import ALL, apart, sources_of
 from tests.support import zoo
 from tests.support.meshes import mesh_of
@@ -151,6 +153,17 @@ def test_barriers_and_limits_hold():
     field = gc.exact_distance(mesh, 0, 0.5, barriers=[7])
     carried = field.transport(ANGLE)
     np.testing.assert_array_equal(np.isfinite(carried), np.isfinite(field.distances))
+
+
+@pytest.mark.parametrize(("share", "is_past"), [(0.5, True), (1.5, False)])
+def test_straight_through_is_how_far_a_path_may_bend_and_go_past_a_vertex(share, is_past):
+    """On either side of a saddle and of a tip, and inside a boundary, but not around it."""
+    turn = math.pi + share * STRAIGHT_THROUGH
+    for total in (1.6 * math.pi, 2.5 * math.pi):
+        for back, onward in ((0.3, 0.3 + turn), (0.3 + turn, 0.3)):
+            assert is_straight(back, onward % total, total, True) == is_past
+    assert is_straight(0.1, 0.1 + turn, 1.5 * math.pi, False) == is_past
+    assert not is_straight(0.1, 0.1 + 0.5 * math.pi, 1.5 * math.pi, False)
 
 
 @pytest.mark.parametrize("angle", [math.nan, math.inf, "north", None, [1.0], True])

@@ -239,7 +239,7 @@ def test_lengths_have_the_shape_of_faces(lengths):
         gc.TriangleMesh.from_lengths(TETRAHEDRON, lengths)
 
 
-def test_faces_must_agree_on_their_edge():
+def test_rounded_length_is_how_far_faces_may_disagree_on_their_edge():
     lengths = np.ones((4, 3))
     lengths[0, 1], lengths[3, 2] = 1.2, 1.3
     with pytest.raises(
