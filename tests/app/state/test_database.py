@@ -1,4 +1,4 @@
-"""What both databases promise, and files of SQLite that are older, damaged or full."""
+"""Promises of both databases, and files of SQLite that are older, damaged or full."""
 
 import asyncio
 import errno
