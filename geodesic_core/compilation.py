@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
+
 from geodesic_core import samples
 from geodesic_core.control import Control
 from geodesic_core.errors import InternalError, InvalidArgument
@@ -93,6 +95,8 @@ def _maps() -> None:
     corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [1, 1, 1]]
     faces = [[0, 1, 2], [0, 1, 3], [0, 1, 4], [1, 2, 5]]  # an edge of three: seen in the mirror
     log_map(TriangleMesh(corners, faces), 5)
+    TriangleMesh.from_lengths([[0, 1, 2]], np.ones((1, 3)))
+    exact_distance(_mesh(), 0).transport(0.0)
 
 
 WORKLOADS: dict[str, Callable[[], None]] = {

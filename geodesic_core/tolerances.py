@@ -335,6 +335,20 @@ NO_DIRECTION = 1e-12
 What is left of a vector along the normal is rounding.
 """
 
+ROUNDED_LENGTH = 1e-9
+"""Share by which given lengths of one edge may differ, or break the triangle inequality.
+
+Averaged or rescaled lengths come from single precision or from sums. All faces then take the length
+that the lowest of them has.
+"""
+
+STRAIGHT_THROUGH = 1e-6
+"""Radians from half a turn at a vertex up to which a path is straight there on one side.
+
+A path that passes a vertex by less than its length rounds may be led through it, with a bend of
+some 1e-8.
+"""
+
 ROUNDED_TURN = 1e-9
 """Share of a full turn by which the angles around a flat vertex may exceed it by rounding."""
 

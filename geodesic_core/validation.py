@@ -45,6 +45,19 @@ def as_vector(name: str, value: Any) -> Floats:
     return vector
 
 
+def as_angle(angle: float) -> float:
+    """Return an angle, radians.
+
+    Raises
+    ------
+    InvalidArgument
+        It is not a finite number.
+    """
+    if not is_number(angle) or not math.isfinite(angle):
+        raise InvalidArgument(f"angle is {angle!r}; it must be a finite number, in radians")
+    return float(angle)
+
+
 def as_limit(max_distance: float | None) -> float:
     """Return a distance, infinite for None.
 

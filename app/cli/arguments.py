@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
@@ -45,44 +44,12 @@ class Merge:
 NO_MERGE = Merge("none")
 
 
-class Method(StrEnum):
-    """Methods of solving."""
-
-    EXACT = "exact"
-    APPROXIMATE = "approximate"
-    FAST = "fast"
-
-
-class BoundedMethod(StrEnum):
-    """Methods of solving with a bound that is guaranteed."""
-
-    EXACT = "exact"
-    APPROXIMATE = "approximate"
-
-
-class Layout(StrEnum):
-    """Layouts of a matrix."""
-
-    DENSE = "dense"
-    SPARSE = "sparse"
-    PAIRS = "pairs"
-
-
-class Number(StrEnum):
-    """Types of numbers in files."""
-
-    FLOAT64 = "float64"
-    FLOAT32 = "float32"
-
-
-class SampleName(StrEnum):
-    """Names of sample meshes."""
-
-    KNOT = "knot"
-    SPHERE = "sphere"
-    TERRAIN = "terrain"
-    OBSTACLES = "obstacles"
-    PLANE = "plane"
+Method = Literal["exact", "approximate", "fast"]
+BoundedMethod = Literal["exact", "approximate"]
+"""Methods of solving whose bound is guaranteed"""
+Layout = Literal["dense", "sparse", "pairs"]
+Number = Literal["float64", "float32"]
+SampleName = Literal["knot", "sphere", "terrain", "obstacles", "plane"]
 
 
 def effort(text: str) -> int:
@@ -246,7 +213,7 @@ EffortOption = Annotated[
 
 
 def accuracy(
-    method: Method | BoundedMethod,
+    method: Method,
     relative_error: float | None,
     absolute_error: float | None,
     effort: int | None = None,
@@ -259,10 +226,10 @@ def accuracy(
     }
     given = {name: option for name, option in options.items() if option[0] is not None}
     for name, (_, needed) in given.items():
-        if method.value != needed:
+        if method != needed:
             option = "--" + name.replace("_", "-")
             raise typer.BadParameter(f"{option} goes with --method {needed} only")
-    return {"method": method.value, **{name: value for name, (value, _) in given.items()}}
+    return {"method": method, **{name: value for name, (value, _) in given.items()}}
 
 
 def limits(max_distance: float | None, barriers: BlockedFaces | None) -> dict[str, Any]:

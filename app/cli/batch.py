@@ -16,7 +16,6 @@ from app.cli.arguments import (
     FormatOption,
     MaxDistance,
     MergeOption,
-    Method,
     MethodOption,
     RelativeError,
     SomeTargets,
@@ -25,10 +24,10 @@ from app.cli.arguments import (
     writable,
 )
 from app.cli.ask import check
-from app.cli.batch_rows import Questions, Row, ask, seconds_of
+from app.cli.batch_rows import Questions, Row, ask
 from app.cli.batch_table import csv_of, write_table
 from app.cli.output import AsJson, Output, print_json, print_parts
-from app.cli.parcels import Pool, answers_of
+from app.cli.parcels import answers_of
 from app.cli.steps import showing
 
 _FAILED = 1
@@ -50,7 +49,7 @@ def batch(
         ),
     ] = None,
     target: SomeTargets = None,
-    method: MethodOption = Method.EXACT,
+    method: MethodOption = "exact",
     relative_error: RelativeError = None,
     effort: EffortOption = None,
     max_distance: MaxDistance = None,
@@ -80,7 +79,9 @@ def batch(
 
     meshes = list(dict.fromkeys(meshes))  # once each, as patterns of a shell may overlap
     count = min(processes or available_cores(), len(meshes))
-    rows, seconds = _rows_of(meshes, questions, count)
+    start = perf_counter()
+    rows = _rows_of(meshes, questions, count)
+    seconds = perf_counter() - start
     ordered = [row for mesh in meshes for row in rows[mesh]]
     if as_json:
         print_json([asdict(row) for row in ordered])
@@ -89,10 +90,9 @@ def batch(
     elif out is not None:
         write_table(out, ordered)
     failed = {row.mesh: row.error for row in ordered if row.error is not None}
-    busy = sum(map(seconds_of, rows.values())) / (count * seconds)
     output.say(f"meshes      {len(meshes)}, {len(failed)} of them failed")
     output.say(f"rows        {len(ordered)}")
-    output.say(f"took        {seconds:.3f} s, {count} processes, busy {busy:.0%} of the time")
+    output.say(f"took        {seconds:.3f} s, {count} processes")
     output.say_written()
     for row in ordered:
         if row.warning is not None:
@@ -103,27 +103,16 @@ def batch(
         raise typer.Exit(_FAILED)
 
 
-def _rows_of(
-    meshes: Sequence[Path], questions: Questions, processes: int
-) -> tuple[dict[Path, list[Row]], float]:
-    """Return the rows of each mesh, and the seconds that all took once kernels were loaded."""
-    from app.engine import fork_server
-
+def _rows_of(meshes: Sequence[Path], questions: Questions, processes: int) -> dict[Path, list[Row]]:
+    """Return the rows of each mesh."""
     with showing("Loading kernels (compiled on the first run)"):
-        fork_server.start()  # which loads them, if they are compiled
         from geodesic_core import compile_kernels
 
         compile_kernels(["exact", "paths"])
-        pool = Pool(processes)
     rows: dict[Path, list[Row]] = {}
-    start, seconds = perf_counter(), 0.0
     with showing(f"Solving {len(meshes)} meshes") as step:
-        for mesh, answer in answers_of(partial(ask, questions), meshes, pool, step.check):
-            rows[mesh] = [_died(mesh)] if answer is None else answer
-            seconds = perf_counter() - start
+        for mesh, answer in answers_of(partial(ask, questions), meshes, processes, step.check):
+            died = Row(str(mesh), error="the process died, perhaps for lack of memory")
+            rows[mesh] = [died] if answer is None else answer
             step.progress(len(rows) / len(meshes))
-    return rows, seconds
-
-
-def _died(mesh: Path) -> Row:
-    return Row(str(mesh), error="the process died, perhaps for lack of memory")
+    return rows

@@ -70,11 +70,6 @@ def ask(questions: Questions, file: Path) -> list[Row]:
     ]
 
 
-def seconds_of(rows: Sequence[Row]) -> float:
-    """Return the seconds that a mesh took."""
-    return (rows[0].read_s or 0.0) + sum(row.solve_s or 0.0 for row in rows)
-
-
 def _rows_from(questions: Questions, source: Point, mesh: "TriangleMesh", read: Row) -> list[Row]:
     """Return the rows of a source."""
     import geodesic_core as gc

@@ -73,22 +73,9 @@ def _options(
     show_help_without_command(context)
 
 
-for command in (
-    serve.serve,
-    meshes.info,
-    queries.distance,
-    queries.path,
-    queries.steps,
-    queries.paths,
-    queries.isolines,
-    queries.borders,
-    tables.matrix,
-    batch.batch,
-    queries.nearest,
-    queries.locate,
-    meshes.sample,
-):
-    cli.command()(command)
-
+for function in (serve.serve, meshes.info, meshes.sample, tables.matrix, batch.batch):
+    cli.command()(function)
+for name, command in queries.COMMANDS.items():
+    cli.command(name)(queries.function_of(command))
 cli.command("compile")(compilation.compile_kernels)
 cli.add_typer(store, name="store")

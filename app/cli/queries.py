@@ -1,8 +1,13 @@
-"""Commands that ask queries of a mesh.
+"""Commands that ask a query of a mesh, made from a table.
 
-They write the same documents as the service. Each option is a parameter, as typer reads them.
+They write the same documents as the service. An entry of the table names the options of a command,
+and what its summary tells; the rest is the same for all.
 """
 
+import inspect
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from inspect import Parameter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,14 +17,12 @@ from app.cli.arguments import (
     NO_MERGE,
     AbsoluteError,
     Barriers,
-    BoundedMethod,
     BoundedMethodOption,
     EffortOption,
     FormatOption,
     MaxDistance,
     MergeOption,
     MeshFile,
-    Method,
     MethodOption,
     PointOrCurveSource,
     PointOrCurveSources,
@@ -31,380 +34,120 @@ from app.cli.arguments import (
     limits,
     writable,
 )
-from app.cli.ask import WrittenMembers, ask
+from app.cli.ask import Answered, ask
 from app.cli.output import AsJson, Output
 from app.cli.points import Point, Position
 from app.cli.steps import Failure, MeshInput
-from app.cli.summary import bound_in_words, print_bound, print_end, print_seconds, print_size
+from app.cli.summary import bound_in_words, print_bound, print_end, print_size
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from app.encoding import Answer
+
+Given = Mapping[str, Any]
+"""The options of a command, by name"""
+Options = Mapping[str, tuple[Any, Any]]
+"""Annotations and defaults, by name, as typer reads them"""
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command that asks a query of a kind."""
+
+    kind: str
+    help: str
+    label: str
+    """What a bar says while the query is answered"""
+    options: Options
+    points: Mapping[str, str]
+    """Members of the request that are points, and the option of each"""
+    lines: Callable[[Given, Mapping[str, Any]], Iterator[str]]
+    """The lines of the summary, by options and answer"""
+    members: Callable[[Given], dict[str, Any]] = lambda _: {}
+    """Checks options, and returns further members of the request"""
+
+
+_NEEDED = Parameter.empty
+_MESH: Options = {
+    "file_format": (FormatOption, None),
+    "merge": (MergeOption, NO_MERGE),
+    "as_json": (AsJson, False),
+}
+_REACH: Options = {"max_distance": (MaxDistance, None), "barriers": (Barriers, None)}
+_ERRORS: Options = {
+    "relative_error": (RelativeError, None),
+    "absolute_error": (AbsoluteError, None),
+}
+_ACCURACY: Options = {
+    "method": (MethodOption, "exact"),
+    **_ERRORS,
+    "effort": (EffortOption, None),
+}
+_CHORD_ERROR: Options = {
+    "chord_error": (
+        Annotated[
+            float | None,
+            typer.Option(
+                help="How far lines may deviate from the exact ones inside faces, in mesh units."
+            ),
+        ],
+        None,
+    )
+}
+_LINES = ".obj", ".csv", ".json"
+
+
+def _out(what: str, *suffixes: str) -> Options:
+    option = typer.Option(help=f"Where the {what}", callback=writable(*suffixes))
+    return {"out": (Annotated[Path | None, option], None)}
+
+
+def _points(help_text: str, *, default: Any = _NEEDED, several: bool = True) -> tuple[Any, Any]:
+    option = typer.Option(parser=Point.parse, metavar="POINT", help=help_text)
+    kind: Any = list[Point] if several else Point
+    return Annotated[kind if default is _NEEDED else kind | None, option], default
+
+
+_POINTS_OUT = _out("points go, too: .csv or .json; - prints .csv.", ".csv", ".json")
+_LINES_OUT = _out("lines go: .obj (polylines), .csv or .json; - prints .csv.", *_LINES)
+_STOPS: Options = {
+    "source": (Source, _NEEDED),
+    "target": _points("The point to go to.", several=False),
+    "via": _points("A point to pass on the way; may be repeated, in order.", default=None),
+}
+_STOPS_AS_POINTS = {"source": "source", "target": "target", "waypoints": "via"}
+
+
+# Distance
+
+
+def _included(given: Given) -> dict[str, Any]:
+    return {"include": ["nearest_source", *(["gradient"] if given["gradient"] else [])]}
+
+
+def _of_distance(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
+    import numpy as np
+
+    distances = found["distances"]
+    reached = np.isfinite(distances)
+    yield f"reached     {np.count_nonzero(reached)} of {len(reached)} vertices"
+    if reached.any():
+        farthest = int(np.argmax(np.where(reached, distances, -1.0)))
+        yield f"farthest    vertex {farthest} at {float(distances[farthest])!r}"
+
+
+def _with_columns(answer: "Answer", out: Path | None) -> "Answer | None":
+    """Return the distances with their gradients beside them, where a file has room for an array."""
+    if "gradient" not in answer.members or out is None or out.suffix.lower() != ".npy":
+        return None
+    import numpy as np
 
     from app.encoding import Answer
 
-LINES = ".obj", ".csv", ".json"
-"""Suffixes of files that hold lines."""
-
-PointsOut = Annotated[
-    Path | None,
-    typer.Option(
-        help="Where the points go, too: .csv or .json; - prints .csv.",
-        callback=writable(".csv", ".json"),
-    ),
-]
-LinesOut = Annotated[
-    Path | None,
-    typer.Option(
-        help="Where the lines go: .obj (polylines), .csv or .json; - prints .csv.",
-        callback=writable(*LINES),
-    ),
-]
-ChordError = Annotated[
-    float | None,
-    typer.Option(help="How far lines may deviate from the exact ones inside faces, in mesh units."),
-]
+    columns = np.column_stack([answer.members["distances"], answer.members["gradient"]])
+    return Answer({"array": columns}, ("array",))
 
 
-def distance(
-    mesh_file: MeshFile,
-    source: PointOrLabelSources,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            help="Where the distances go: .npy, .csv, .json or .ply (the mesh, coloured); - "
-            "prints .csv.",
-            callback=writable(".npy", ".csv", ".json", ".ply"),
-        ),
-    ] = None,
-    gradient: Annotated[
-        bool,
-        typer.Option(
-            "--gradient",
-            help="Also the direction in which distance grows, at each vertex; in .npy as three "
-            "more columns.",
-        ),
-    ] = False,
-    max_distance: MaxDistance = None,
-    method: MethodOption = Method.EXACT,
-    relative_error: RelativeError = None,
-    absolute_error: AbsoluteError = None,
-    effort: EffortOption = None,
-    barriers: Barriers = None,
-    file_format: FormatOption = None,
-    merge: MergeOption = NO_MERGE,
-    as_json: AsJson = False,
-) -> None:
-    """Compute the distance of every vertex from the nearest source."""
-    output = Output(out, as_json)
-    members = accuracy(method, relative_error, absolute_error, effort)
-    members["include"] = ["nearest_source", *(["gradient"] if gradient else [])]
-    members |= limits(max_distance, barriers)
-    points: WrittenMembers = {"sources": source}
-    answered = ask(
-        "distances",
-        MeshInput(mesh_file, file_format, merge),
-        "Computing distances",
-        points,
-        members,
-    )
-    import numpy as np
-
-    found = answered.answer.members
-    distances = found["distances"]
-    columns = None
-    if gradient and out is not None and out.suffix.lower() == ".npy":
-        columns = _array(np.column_stack([distances, found["gradient"]]))
-    output.write(answered.answer, in_file=columns)
-    reached = np.isfinite(distances)
-    print_size(output, answered.mesh)
-    output.say(f"reached     {np.count_nonzero(reached)} of {len(reached)} vertices")
-    if reached.any():
-        farthest = int(np.argmax(np.where(reached, distances, -1.0)))
-        output.say(f"farthest    vertex {farthest} at {float(distances[farthest])!r}")
-    print_bound(output, found["error_bound"])
-    print_end(output, answered)
-
-
-def path(
-    mesh_file: MeshFile,
-    source: Source,
-    target: Annotated[
-        Point,
-        typer.Option(parser=Point.parse, metavar="POINT", help="The point to go to."),
-    ],
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            help="Where the path goes: .obj (a polyline), .csv or .json; its "
-            "points alone to .npy. - prints .csv.",
-            callback=writable(*LINES, ".npy"),
-        ),
-    ] = None,
-    via: Annotated[
-        list[Point] | None,
-        typer.Option(
-            parser=Point.parse,
-            metavar="POINT",
-            help="A point to pass on the way; may be repeated, in order.",
-        ),
-    ] = None,
-    max_distance: MaxDistance = None,
-    method: MethodOption = Method.EXACT,
-    relative_error: RelativeError = None,
-    absolute_error: AbsoluteError = None,
-    effort: EffortOption = None,
-    barriers: Barriers = None,
-    file_format: FormatOption = None,
-    merge: MergeOption = NO_MERGE,
-    as_json: AsJson = False,
-) -> None:
-    """Compute a shortest path over the surface between two points."""
-    output = Output(out, as_json)
-    members = accuracy(method, relative_error, absolute_error, effort)
-    if method is not Method.EXACT and via:
-        raise typer.BadParameter("--via goes with --method exact only")
-    members |= limits(max_distance, barriers)
-    points: WrittenMembers = {"source": source, "target": target, "waypoints": via or []}
-    answered = ask(
-        "path", MeshInput(mesh_file, file_format, merge), "Computing the path", points, members
-    )
-    found = answered.answer.members
-    if found["status"] != "ok":
-        raise Failure(_NO_PATH[found["reason"]].format(limit=max_distance))
-    output.write(answered.answer)
-    print_size(output, answered.mesh)
-    output.say(f"length      {found['length']!r}")
-    output.say(f"points      {len(found['points'])}")
-    print_bound(output, found["error_bound"])
-    print_seconds(output, answered)
-    output.say_written()
-
-
-def steps(
-    mesh_file: MeshFile,
-    source: Source,
-    target: Annotated[
-        Point,
-        typer.Option(parser=Point.parse, metavar="POINT", help="The point to go to."),
-    ],
-    via: Annotated[
-        list[Point] | None,
-        typer.Option(
-            parser=Point.parse,
-            metavar="POINT",
-            help="A point to pass on the way; may be repeated, in order.",
-        ),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(help="Where the steps go: .json.", callback=writable(".json")),
-    ] = None,
-    max_distance: MaxDistance = None,
-    barriers: Barriers = None,
-    file_format: FormatOption = None,
-    merge: MergeOption = NO_MERGE,
-    as_json: AsJson = False,
-) -> None:
-    """Tell what the search for a path does, step by step."""
-    output = Output(out, as_json)
-    points: WrittenMembers = {"source": source, "target": target, "waypoints": via or []}
-    answered = ask(
-        "steps",
-        MeshInput(mesh_file, file_format, merge),
-        "Searching",
-        points,
-        limits(max_distance, barriers),
-    )
-    output.write(answered.answer)
-    print_size(output, answered.mesh)
-    for step in answered.answer.members["steps"]:
-        output.say(
-            f"leg {step['leg']}, {step['name']:12} bound {step['bound']!r}, "
-            f"{step['windows']} windows, {len(step['faces'])} faces"
-        )
-    print_end(output, answered)
-
-
-def paths(
-    mesh_file: MeshFile,
-    source: PointOrCurveSource,
-    target: Targets,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            help="Where the paths go: .obj (a polyline each), .csv or .json; - prints .csv.",
-            callback=writable(*LINES),
-        ),
-    ] = None,
-    max_distance: MaxDistance = None,
-    method: MethodOption = Method.EXACT,
-    relative_error: RelativeError = None,
-    absolute_error: AbsoluteError = None,
-    effort: EffortOption = None,
-    barriers: Barriers = None,
-    file_format: FormatOption = None,
-    merge: MergeOption = NO_MERGE,
-    as_json: AsJson = False,
-) -> None:
-    """Compute shortest paths from one point to several others, in one sweep."""
-    output = Output(out, as_json)
-    members = accuracy(method, relative_error, absolute_error, effort)
-    members |= limits(max_distance, barriers)
-    points: WrittenMembers = {"source": source, "targets": target}
-    answered = ask(
-        "paths", MeshInput(mesh_file, file_format, merge), "Computing the paths", points, members
-    )
-    output.write(answered.answer)
-    print_size(output, answered.mesh)
-    for written, path in zip(target, answered.answer.members["paths"], strict=True):
-        if path["status"] == "ok":
-            bound = bound_in_words(path["error_bound"])
-            output.say(f"path        to {written.text}: {path['length']!r}, error bound {bound}")
-        else:
-            output.say(f"no path     to {written.text}: {path['reason']}")
-    print_end(output, answered)
-
-
-def isolines(
-    mesh_file: MeshFile,
-    source: PointOrLabelSources,
-    out: LinesOut = None,
-    level: Annotated[
-        list[float] | None,
-        typer.Option(help="A distance at which to draw lines; may be repeated."),
-    ] = None,
-    count: Annotated[
-        int | None,
-        typer.Option(min=1, help="In place of --level: the number of evenly spaced levels."),
-    ] = None,
-    chord_error: ChordError = None,
-    max_distance: MaxDistance = None,
-    method: BoundedMethodOption = BoundedMethod.EXACT,
-    relative_error: RelativeError = None,
-    absolute_error: AbsoluteError = None,
-    barriers: Barriers = None,
-    file_format: FormatOption = None,
-    merge: MergeOption = NO_MERGE,
-    as_json: AsJson = False,
-) -> None:
-    """Draw lines of equal distance from the nearest source."""
-    output = Output(out, as_json)
-    members = accuracy(method, relative_error, absolute_error)
-    if (count is None) == (level is None):
-        raise typer.BadParameter("give --count, or --level at least once, and not both")
-    members |= {"levels": level, "count": count, "chord_error": chord_error}
-    members |= limits(max_distance, barriers)
-    points: WrittenMembers = {"sources": source}
-    answered = ask(
-        "isolines", MeshInput(mesh_file, file_format, merge), "Drawing isolines", points, members
-    )
-    output.write(answered.answer)
-    print_size(output, answered.mesh)
-    for each in answered.answer.members["isolines"]:
-        lines = each["lines"]
-        closed = sum(line["closed"] for line in lines)
-        length = sum(line["length"] for line in lines)
-        output.say(
-            f"level       {each['level']!r}: {closed} closed, {len(lines) - closed} open, "
-            f"{float(length)!r} long"
-        )
-    print_bound(output, answered.answer.members["error_bound"])
-    print_end(output, answered)
-
-
-def borders(
-    mesh_file: MeshFile,
-    source: PointOrCurveSources,
-    out: LinesOut = None,
-    chord_error: ChordError = None,
-    max_distance: MaxDistance = None,
-    barriers: Barriers = None,
-    file_format: FormatOption = None,
-    merge: MergeOption = NO_MERGE,
-    as_json: AsJson = False,
-) -> None:
-    """Draw the borders between the parts of the surface that are nearest to each source."""
-    output = Output(out, as_json)
-    members = {"chord_error": chord_error} | limits(max_distance, barriers)
-    points: WrittenMembers = {"sources": source}
-    answered = ask(
-        "borders", MeshInput(mesh_file, file_format, merge), "Drawing borders", points, members
-    )
-    output.write(answered.answer)
-    print_size(output, answered.mesh)
-    for line in answered.answer.members["borders"]:
-        first, second = line["sources"]
-        kind = "closed" if line["closed"] else "open"
-        output.say(
-            f"border      of sources {first} and {second}: {kind}, {float(line['length'])!r} long"
-        )
-    print_end(output, answered)
-
-
-def nearest(
-    mesh_file: MeshFile,
-    source: Source,
-    candidate: Annotated[
-        list[Point],
-        typer.Option(parser=Point.parse, metavar="POINT", help="A candidate; may be repeated."),
-    ],
-    k: Annotated[int, typer.Option("-k", min=1, help="How many to find.")] = 1,
-    out: PointsOut = None,
-    max_distance: MaxDistance = None,
-    barriers: Barriers = None,
-    file_format: FormatOption = None,
-    merge: MergeOption = NO_MERGE,
-    as_json: AsJson = False,
-) -> None:
-    """Find the candidates that are nearest to a point along the surface."""
-    output = Output(out, as_json)
-    if k > len(candidate):
-        raise typer.BadParameter(f"-k is {k}, but there are only {len(candidate)} candidates")
-    members = {"k": k} | limits(max_distance, barriers)
-    points: WrittenMembers = {"source": source, "candidates": candidate}
-    answered = ask(
-        "nearest",
-        MeshInput(mesh_file, file_format, merge),
-        "Looking for the nearest",
-        points,
-        members,
-    )
-    found = answered.answer.members["nearest"]
-    output.write(answered.answer)
-    print_size(output, answered.mesh)
-    output.say(f"found       {len(found)} of {k}")
-    for each in found:
-        output.say(f"nearest     {candidate[each['candidate']].text} at {each['distance']!r}")
-    print_end(output, answered)
-
-
-def locate(
-    mesh_file: MeshFile,
-    at: Annotated[
-        Position,
-        typer.Option(parser=Position.parse, metavar="X,Y,Z", help="The position, mesh units."),
-    ],
-    out: PointsOut = None,
-    file_format: FormatOption = None,
-    merge: MergeOption = NO_MERGE,
-    as_json: AsJson = False,
-) -> None:
-    """Find the point of the surface that is nearest to a position."""
-    output = Output(out, as_json)
-    answered = ask(
-        "locate",
-        MeshInput(mesh_file, file_format, merge),
-        "Looking for the point",
-        {"points": [at]},
-        {},
-    )
-    (point,) = answered.answer.members["points"]
-    output.write(answered.answer)
-    output.say(f"point       {_as_option(point)}")
-    output.say(f"position    {','.join(map(repr, point['position']))}")
-    output.say(f"distance    {point['distance']!r}")
-    output.say_written()
-
+# Paths
 
 _NO_PATH = {
     "disconnected": "there is no path: the points are in different connected components",
@@ -412,14 +155,284 @@ _NO_PATH = {
 }
 
 
-def _array(array: Any) -> "Answer":
-    from app.encoding import Answer
+def _without_via(given: Given) -> dict[str, Any]:
+    if given["method"] != "exact" and given["via"]:
+        raise typer.BadParameter("--via goes with --method exact only")
+    return {}
 
-    return Answer({"array": array}, ("array",))
+
+def _of_path(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
+    yield f"length      {found['length']!r}"
+    yield f"points      {len(found['points'])}"
 
 
-def _as_option(point: "Mapping[str, Any]") -> str:
-    """Return a described point in the spelling of options."""
+def _of_steps(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
+    for step in found["steps"]:
+        yield (
+            f"leg {step['leg']}, {step['name']:12} bound {step['bound']!r}, "
+            f"{step['windows']} windows, {len(step['faces'])} faces"
+        )
+
+
+def _of_paths(given: Given, found: Mapping[str, Any]) -> Iterator[str]:
+    for written, path in zip(given["target"], found["paths"], strict=True):
+        if path["status"] == "ok":
+            bound = bound_in_words(path["error_bound"])
+            yield f"path        to {written.text}: {path['length']!r}, error bound {bound}"
+        else:
+            yield f"no path     to {written.text}: {path['reason']}"
+
+
+# Lines
+
+
+def _levels(given: Given) -> dict[str, Any]:
+    if (given["count"] is None) == (given["level"] is None):
+        raise typer.BadParameter("give --count, or --level at least once, and not both")
+    return {"levels": given["level"], "count": given["count"]}
+
+
+def _of_isolines(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
+    for each in found["isolines"]:
+        lines = each["lines"]
+        closed = sum(line["closed"] for line in lines)
+        length = sum(line["length"] for line in lines)
+        yield (
+            f"level       {each['level']!r}: {closed} closed, {len(lines) - closed} open, "
+            f"{float(length)!r} long"
+        )
+
+
+def _of_borders(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
+    for line in found["borders"]:
+        first, second = line["sources"]
+        kind = "closed" if line["closed"] else "open"
+        yield f"border      of sources {first} and {second}: {kind}, {float(line['length'])!r} long"
+
+
+# Points
+
+
+def _k(given: Given) -> dict[str, Any]:
+    k, count = given["k"], len(given["candidate"])
+    if k > count:
+        raise typer.BadParameter(f"-k is {k}, but there are only {count} candidates")
+    return {"k": k}
+
+
+def _of_nearest(given: Given, found: Mapping[str, Any]) -> Iterator[str]:
+    yield f"found       {len(found['nearest'])} of {given['k']}"
+    for each in found["nearest"]:
+        yield f"nearest     {given['candidate'][each['candidate']].text} at {each['distance']!r}"
+
+
+def _of_locate(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
+    (point,) = found["points"]
     if "vertex" in point:
-        return f"v{point['vertex']}"
-    return f"f{point['face']}:{','.join(map(repr, point['barycentric']))}"
+        yield f"point       v{point['vertex']}"
+    else:
+        yield f"point       f{point['face']}:{','.join(map(repr, point['barycentric']))}"
+    yield f"position    {','.join(map(repr, point['position']))}"
+    yield f"distance    {point['distance']!r}"
+
+
+COMMANDS = {
+    "distance": Command(
+        "distances",
+        "Compute the distance of every vertex from the nearest source.",
+        "Computing distances",
+        {
+            "source": (PointOrLabelSources, _NEEDED),
+            **_out(
+                "distances go: .npy, .csv, .json or .ply (the mesh, coloured); - prints .csv.",
+                *(".npy", ".csv", ".json", ".ply"),
+            ),
+            "gradient": (
+                Annotated[
+                    bool,
+                    typer.Option(
+                        "--gradient",
+                        help="Also the direction in which distance grows, at each vertex; in .npy "
+                        "as three more columns.",
+                    ),
+                ],
+                False,
+            ),
+            **_ACCURACY,
+            **_REACH,
+        },
+        {"sources": "source"},
+        _of_distance,
+        _included,
+    ),
+    "path": Command(
+        "path",
+        "Compute a shortest path over the surface between two points.",
+        "Computing the path",
+        {
+            **_STOPS,
+            **_out(
+                "path goes: .obj (a polyline), .csv or .json; its points alone to .npy. - prints "
+                ".csv.",
+                *(*_LINES, ".npy"),
+            ),
+            **_ACCURACY,
+            **_REACH,
+        },
+        _STOPS_AS_POINTS,
+        _of_path,
+        _without_via,
+    ),
+    "steps": Command(
+        "steps",
+        "Tell what the search for a path does, step by step.",
+        "Searching",
+        {**_STOPS, **_out("steps go: .json.", ".json"), **_REACH},
+        _STOPS_AS_POINTS,
+        _of_steps,
+    ),
+    "paths": Command(
+        "paths",
+        "Compute shortest paths from one point to several others, in one sweep.",
+        "Computing the paths",
+        {
+            "source": (PointOrCurveSource, _NEEDED),
+            "target": (Targets, _NEEDED),
+            **_out("paths go: .obj (a polyline each), .csv or .json; - prints .csv.", *_LINES),
+            **_ACCURACY,
+            **_REACH,
+        },
+        {"source": "source", "targets": "target"},
+        _of_paths,
+    ),
+    "isolines": Command(
+        "isolines",
+        "Draw lines of equal distance from the nearest source.",
+        "Drawing isolines",
+        {
+            "source": (PointOrLabelSources, _NEEDED),
+            **_LINES_OUT,
+            "level": (
+                Annotated[
+                    list[float] | None,
+                    typer.Option(help="A distance at which to draw lines; may be repeated."),
+                ],
+                None,
+            ),
+            "count": (
+                Annotated[
+                    int | None,
+                    typer.Option(
+                        min=1, help="In place of --level: the number of evenly spaced levels."
+                    ),
+                ],
+                None,
+            ),
+            **_CHORD_ERROR,
+            "method": (BoundedMethodOption, "exact"),
+            **_ERRORS,
+            **_REACH,
+        },
+        {"sources": "source"},
+        _of_isolines,
+        _levels,
+    ),
+    "borders": Command(
+        "borders",
+        "Draw the borders between the parts of the surface that are nearest to each source.",
+        "Drawing borders",
+        {"source": (PointOrCurveSources, _NEEDED), **_LINES_OUT, **_CHORD_ERROR, **_REACH},
+        {"sources": "source"},
+        _of_borders,
+    ),
+    "nearest": Command(
+        "nearest",
+        "Find the candidates that are nearest to a point along the surface.",
+        "Looking for the nearest",
+        {
+            "source": (Source, _NEEDED),
+            "candidate": _points("A candidate; may be repeated."),
+            "k": (Annotated[int, typer.Option("-k", min=1, help="How many to find.")], 1),
+            **_POINTS_OUT,
+            **_REACH,
+        },
+        {"source": "source", "candidates": "candidate"},
+        _of_nearest,
+        _k,
+    ),
+    "locate": Command(
+        "locate",
+        "Find the point of the surface that is nearest to a position.",
+        "Looking for the point",
+        {
+            "at": (
+                Annotated[
+                    Position,
+                    typer.Option(
+                        parser=Position.parse, metavar="X,Y,Z", help="The position, mesh units."
+                    ),
+                ],
+                _NEEDED,
+            ),
+            **_POINTS_OUT,
+        },
+        {"points": "at"},
+        _of_locate,
+    ),
+}
+"""The commands, by name"""
+
+
+def function_of(command: Command) -> Callable[..., None]:
+    """Return the function of a command, with the signature that typer reads."""
+    options = {"mesh_file": (MeshFile, _NEEDED), **command.options, **_MESH}
+
+    def run(**given: Any) -> None:
+        _run(command, given)
+
+    run.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        [
+            Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+            for name, (annotation, default) in options.items()
+        ]
+    )
+    run.__annotations__ = {name: annotation for name, (annotation, _) in options.items()}
+    run.__doc__ = command.help
+    return run
+
+
+def _run(command: Command, given: dict[str, Any]) -> None:
+    output = Output(given["out"], given["as_json"])
+    members = command.members(given)
+    if "method" in given:
+        names = [name for name in _ACCURACY if name in given]
+        members |= accuracy(**{name: given[name] for name in names})
+    if "chord_error" in given:
+        members["chord_error"] = given["chord_error"]
+    if "barriers" in given:
+        members |= limits(given["max_distance"], given["barriers"])
+    points = {member: given[option] or [] for member, option in command.points.items()}
+    if command.kind == "locate":
+        points["points"] = [points["points"]]
+    mesh = MeshInput(given["mesh_file"], given["file_format"], given["merge"])
+    answered = ask(command.kind, mesh, command.label, points, members)
+    found = answered.answer.members
+    if found.get("status") == "no_path":
+        raise Failure(_NO_PATH[found["reason"]].format(limit=given["max_distance"]))
+    output.write(answered.answer, in_file=_with_columns(answered.answer, output.out))
+    _summarize(output, command, given, answered)
+
+
+def _summarize(output: Output, command: Command, given: Given, answered: Answered) -> None:
+    found = answered.answer.members
+    if command.kind == "locate":  # which is about a point, and not about the mesh
+        for line in command.lines(given, found):
+            output.say(line)
+        output.say_written()
+        return
+    print_size(output, answered.mesh)
+    for line in command.lines(given, found):
+        output.say(line)
+    if "error_bound" in found and command.kind != "nearest":  # which is always exact
+        print_bound(output, found["error_bound"])
+    print_end(output, answered)

@@ -90,7 +90,7 @@ def check(root: Root = _DEFAULT, as_json: AsJson = False) -> None:
     from app.service.maintenance import inspect
 
     with _store_at(root), showing("Reading"):
-        found = [damage.detail for damage in inspect(root) if damage is not None]
+        found = list(inspect(root))
     if as_json:
         print_json({"damaged": found})
     else:

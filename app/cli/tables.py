@@ -18,7 +18,6 @@ from app.cli.arguments import (
     MaxDistance,
     MergeOption,
     MeshFile,
-    Method,
     MethodOption,
     Number,
     RelativeError,
@@ -118,12 +117,12 @@ def matrix(
     points: PointsFile = None,
     sources: SourcesFile = None,
     targets: TargetsFile = None,
-    layout: LayoutOption = Layout.DENSE,
-    method: MethodOption = Method.EXACT,
+    layout: LayoutOption = "dense",
+    method: MethodOption = "exact",
     relative_error: RelativeError = None,
     absolute_error: AbsoluteError = None,
     effort: EffortOption = None,
-    dtype: NumberOption = Number.FLOAT64,
+    dtype: NumberOption = "float64",
     threads: Threads = None,
     service: Service = None,
     max_distance: MaxDistance = None,
@@ -140,7 +139,7 @@ def matrix(
     mesh_input = MeshInput(mesh_file, file_format, merge)
     if not given:
         _check_points(source, target, dtype, threads, service)
-        members = options | {"layout": layout.value} | limits(max_distance, barriers)
+        members = options | {"layout": layout} | limits(max_distance, barriers)
         _ask_matrix(mesh_input, Output(out, as_json), source, target, layout, members)
         return
     _check_files(list(given), source, target, layout)
@@ -161,7 +160,7 @@ def matrix(
         options,
         max_distance,
         blocked,
-        dtype.value,
+        dtype,
     )
     with files.writing(out):
         if service is None:
@@ -181,7 +180,7 @@ def _check_points(
     """Refuse options that do not go together where no points are from files."""
     if not source or not target:
         raise typer.BadParameter("give --source and --target, or --points with a file")
-    if dtype is not Number.FLOAT64 or threads or service:
+    if dtype != "float64" or threads or service:
         raise typer.BadParameter("--dtype, --threads and --service apply only to points from files")
 
 
@@ -191,7 +190,7 @@ def _check_files(
     """Refuse options that do not go together where points are from the files of some options."""
     if named not in (["--points"], ["--sources", "--targets"]):
         raise typer.BadParameter("give --points, or both --sources and --targets")
-    if source or target or layout is not Layout.DENSE:
+    if source or target or layout != "dense":
         raise typer.BadParameter(f"--source, --target and --layout do not go with {named[0]}")
 
 
@@ -217,11 +216,11 @@ def _ask_matrix(
     members: Mapping[str, Any],
 ) -> None:
     """Ask for a matrix as the service would be asked."""
-    wanted = (".npz" if layout is Layout.SPARSE else ".npy", ".csv", ".json", "")
+    wanted = (".npz" if layout == "sparse" else ".npy", ".csv", ".json", "")
     suffix = "" if output.out is None else output.out.suffix.lower()
     if suffix not in wanted:
-        raise typer.BadParameter(f"{suffix} does not go with --layout {layout.value}")
-    if layout is Layout.PAIRS and len(source) != len(target):
+        raise typer.BadParameter(f"{suffix} does not go with --layout {layout}")
+    if layout == "pairs" and len(source) != len(target):
         raise typer.BadParameter(
             f"there are {len(source)} sources and {len(target)} targets; pairs need the same "
             "number of both"
@@ -232,7 +231,7 @@ def _ask_matrix(
 
     output.write(answered.answer)
     reached = np.count_nonzero(np.isfinite(answered.answer.members["distances"]))
-    cells = len(source) if layout is Layout.PAIRS else len(source) * len(target)
+    cells = len(source) if layout == "pairs" else len(source) * len(target)
     print_size(output, answered.mesh)
     output.say(f"reached     {reached} of {cells} distances")
     print_bound(output, answered.answer.members["error_bound"])

@@ -23,7 +23,7 @@ from app.engine.work import MeshFromFile, StoreMesh, Task, TaskResult, WritesRes
 from app.errors import Problem, ProblemError, draining, over_limit, problem
 from app.queries import code_version
 from app.repeating import repeat
-from app.store.interface import Store
+from app.store.store import Store
 from app.tracing import Period, record_span
 
 logger = structlog.get_logger(module=__name__)

@@ -15,8 +15,8 @@ from app.engine.work import (
     WritesResult,
 )
 from app.errors import ProblemError, StoreUnavailableError
-from app.store.interface import Supply
 from app.store.results import Result
+from app.store.store import Supply
 
 
 class SuppliedEngine:
@@ -124,7 +124,7 @@ class SuppliedEngine:
                 return await self._engine.run(task, on_progress)
             except ProblemError as error:
                 if error.problem.code == "mesh_damaged":
-                    await self._supply.distrust(mesh_id)
+                    await self._supply.drop_copy(mesh_id)
                 raise
 
     async def _send(self, result: Result) -> None:

@@ -30,7 +30,7 @@ from app.engine.work import (
     TaskResult,
     Work,
 )
-from app.errors import ProblemError, problem_of, too_large_unpacked
+from app.errors import problem_of, too_large_unpacked
 from app.queries import (
     SMALL_SECONDS,
     ExecutionContext,
@@ -158,21 +158,20 @@ class Worker:
         )
         with clock.phase("load"):
             opened = self._open(work.query)
-        with self._blaming_damage(opened):
-            with clock.phase("compute"):
-                answer = work.query.answer(opened, context)
-            if work.query.representation.media_type == JSON:
-                check_json_size(answer.values, settings.max_json_values, work.query.hint)
-            with clock.phase("encode"):
-                parts, headers = encode(answer, work.query.representation)
-                result = write_result(
-                    self.config.results,
-                    work.result_name,
-                    self._verified_parts(parts, opened, cancel),
-                    headers,
-                    code_version(),
-                    is_cheap=clock.seconds["compute"] < SMALL_SECONDS,
-                )
+        with clock.phase("compute"):
+            answer = work.query.answer(opened, context)
+        if work.query.representation.media_type == JSON:
+            check_json_size(answer.values, settings.max_json_values, work.query.hint)
+        with clock.phase("encode"):
+            parts, headers = encode(answer, work.query.representation)
+            result = write_result(
+                self.config.results,
+                work.result_name,
+                _stopped_if(cancel, parts),
+                headers,
+                code_version(),
+                is_cheap=clock.seconds["compute"] < SMALL_SECONDS,
+            )
         return TaskResult(clock.seconds, clock.periods, result=result)
 
     def _compute_part(
@@ -180,24 +179,23 @@ class Worker:
     ) -> TaskResult:
         with clock.phase("load"):
             opened = self._open(work.query)
-        with self._blaming_damage(opened):
-            with clock.phase("compute"), _refusing_overflow(work.query.representation.dtype):
-                parts = self._parts_of(work, opened, cancel)
-                rows = parts.compute(
-                    work.part,
-                    progress=self._report,
-                    cancel=cancel,
-                    memory_limit=self.settings.query_memory_bytes,
-                )
-            with clock.phase("encode"):
-                result = write_result(
-                    self.config.results,
-                    work.result_name,
-                    self._verified_parts(npy_parts(rows), opened, cancel),
-                    {REACHED: str(parts.reached(rows))},
-                    code_version(),
-                    is_cheap=False,
-                )
+        with clock.phase("compute"), _refusing_overflow(work.query.representation.dtype):
+            parts = self._parts_of(work, opened, cancel)
+            rows = parts.compute(
+                work.part,
+                progress=self._report,
+                cancel=cancel,
+                memory_limit=self.settings.query_memory_bytes,
+            )
+        with clock.phase("encode"):
+            result = write_result(
+                self.config.results,
+                work.result_name,
+                _stopped_if(cancel, npy_parts(rows)),
+                {REACHED: str(parts.reached(rows))},
+                code_version(),
+                is_cheap=False,
+            )
         return TaskResult(clock.seconds, clock.periods, result=result)
 
     def _join_parts(
@@ -236,31 +234,6 @@ class Worker:
         self.fields.write(fields)
         removed = self._before.stored_field_evictions + self._stored.evictions
         self.signals.stored_field_evictions = removed
-
-    @contextmanager
-    def _blaming_damage(self, opened: OpenMesh) -> Iterator[None]:
-        """Replace an error by the damage of the mesh, where that may have caused it."""
-        try:
-            yield
-        except Exception:
-            self._verify(opened)
-            raise
-
-    def _verified_parts(
-        self, parts: Iterable[Buffer], opened: OpenMesh, cancel: Callable[[], bool]
-    ) -> Iterator[Buffer]:
-        """Yield the parts of a body, and raise at its end where the mesh was damaged meanwhile."""
-        for part in parts:
-            _stop_if(cancel)
-            yield part
-        self._verify(opened)
-
-    def _verify(self, opened: OpenMesh) -> None:
-        try:
-            self.store.verify_mapped(opened)
-        except ProblemError:
-            self.fields.take_unwritten()  # they may be wrong
-            raise
 
     def _report(self, share: float) -> None:
         self.signals.progress = share
@@ -306,6 +279,13 @@ def _stop_if(cancel: Callable[[], bool]) -> None:
         raise gc.errors.Cancelled("cancelled between two steps of the work")
 
 
+def _stopped_if(cancel: Callable[[], bool], parts: Iterable[Buffer]) -> Iterator[Buffer]:
+    """Yield the parts of a body; between two of them the work can be stopped."""
+    for part in parts:
+        _stop_if(cancel)
+        yield part
+
+
 @contextmanager
 def _refusing_overflow(dtype: str) -> Iterator[None]:
     with np.errstate(over="raise"):
@@ -347,7 +327,7 @@ def _make_mesh(
         case MeshFromFile(path=path):
             max_bytes = most_unpacked(path.stat().st_size, settings.max_upload_bytes)
             try:
-                return gc.load_mesh(
+                mesh = gc.load_mesh(
                     path,
                     mesh_input.file_type,
                     mesh_input.merge,
@@ -358,6 +338,12 @@ def _make_mesh(
                 )
             except gc.errors.FileTooLarge:
                 raise too_large_unpacked(max_bytes, settings.max_upload_bytes) from None
+            if not mesh.has_positions:
+                raise gc.errors.InvalidMesh(
+                    "the NPZ file has no vertices, whose positions answers tell: add them",
+                    kind="vertex",
+                )
+            return mesh
     if len(faces) > max_faces:
         raise gc.errors.TooManyFaces(len(faces), max_faces)
     if len(vertices) > max_vertices:

@@ -2,11 +2,14 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from functools import partial
 from typing import get_args
 
 from anyio import to_thread
 from prometheus_client import CollectorRegistry, Counter, Histogram, Info
-from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.core import CounterMetricFamily as Count
+from prometheus_client.core import GaugeMetricFamily as Gauge
+from prometheus_client.core import Metric
 from prometheus_client.exposition import choose_encoder
 from prometheus_client.registry import Collector
 
@@ -27,54 +30,29 @@ class Metrics(Collector):
         self._service = service
         self._jobs: Mapping[str, int] = {}
         self._resources: Resources | None = None
-        self._registry = CollectorRegistry()
-        self._requests = Counter(
-            "geodesic_requests",
-            "Requests that were answered, by operation id and status",
-            ["operation", "status"],
-            registry=self._registry,
-        )
-        self._seconds = Histogram(
-            "geodesic_request_seconds",
-            "From the head of a request to the end of its answer",
-            ["operation"],
-            buckets=_BUCKETS,
-            registry=self._registry,
-        )
-        self._lag = Histogram(
-            "geodesic_event_loop_lag_seconds",
-            "How much later than asked for the event loop wakes a coroutine",
-            buckets=_LAG_BUCKETS,
-            registry=self._registry,
-        )
-        waits = Histogram(
-            "geodesic_queue_wait_seconds",
-            "Wait of a request or job for a worker, until it has one or gives up",
-            buckets=_BUCKETS,
-            registry=self._registry,
-        )
-        service.engine.on_wait = waits.observe
-        self._caller_requests = Counter(
-            "geodesic_caller_requests",
-            "Requests that were answered, by the name of the API key",
-            ["caller"],
-            registry=self._registry,
-        )
-        self._caller_seconds = Counter(
-            "geodesic_caller_worker_seconds",
-            "Seconds that workers were busy with requests and jobs, by the name of the API key",
-            ["caller"],
-            registry=self._registry,
-        )
+        self._registry = registry = CollectorRegistry()
+        counter = partial(Counter, registry=registry)
+        histogram = partial(Histogram, buckets=_BUCKETS, registry=registry)
+        answered = "Requests that were answered, by operation id and status"
+        self._requests = counter("geodesic_requests", answered, ["operation", "status"])
+        took = "From the head of a request to the end of its answer"
+        self._seconds = histogram("geodesic_request_seconds", took, ["operation"])
+        late = "How much later than asked for the event loop wakes a coroutine"
+        self._lag = histogram("geodesic_event_loop_lag_seconds", late, buckets=_LAG_BUCKETS)
+        waited = "Wait of a request or job for a worker, until it has one or gives up"
+        service.engine.on_wait = histogram("geodesic_queue_wait_seconds", waited).observe
+        of_key = "Requests that were answered, by the name of the API key"
+        self._caller_requests = counter("geodesic_caller_requests", of_key, ["caller"])
+        worked = "Seconds that workers were busy with requests and jobs, by the name of the API key"
+        self._caller_seconds = counter("geodesic_caller_worker_seconds", worked, ["caller"])
         self._callers = {key.name for key in service.settings.api_keys}
         for name in self._callers:  # from 0 on: Prometheus sees no growth in a first value
             self._caller_requests.labels(name)
             self._caller_seconds.labels(name)
         service.engine.on_work = self._note_work
-        Info("geodesic_build", "Version of the service", registry=self._registry).info(
-            {"version": __version__}
-        )
-        self._registry.register(self)
+        build = Info("geodesic_build", "Version of the service", registry=registry)
+        build.info({"version": __version__})
+        registry.register(self)
 
     def note(self, operation: str, status: int, seconds: float, caller: Caller) -> None:
         """Count a request, and its seconds."""
@@ -109,21 +87,21 @@ class Metrics(Collector):
         """Yield the state of the service."""
         service, load = self._service, self._service.engine.load
         catalog = service.mesh_catalog
-        yield _gauge("geodesic_queue_length", "Requests that wait for a worker", load.waiting)
+        yield Gauge("geodesic_queue_length", "Requests that wait for a worker", load.waiting)
         workers = {"idle": load.idle, "busy": load.busy, "missing": load.missing}
         yield _gauges("geodesic_workers", "Slots for worker processes", "state", workers)
-        yield _counter("geodesic_workers_lost", "Workers that died or were killed", load.lost)
+        yield Count("geodesic_workers_lost", "Workers that died or were killed", load.lost)
         stopped = "Tasks stopped while they ran: by hang-up, deadline, or the end of its job"
-        yield _counter("geodesic_cancellations", stopped, load.cancelled)
+        yield Count("geodesic_cancellations", stopped, load.cancelled)
         lookups = "Lookups of answers in the store"
         yield _counters("geodesic_results_lookups", lookups, "outcome", service.answering.lookups)
         answered, took = "Queries that workers answered", "Seconds that solving them took"
         yield _counters("geodesic_solves", answered, "kind", service.answering.solves)
         yield _counters("geodesic_solve_seconds", took, "kind", service.answering.solve_seconds)
         files = service.results.nbytes
-        yield _gauge("geodesic_results_bytes", "Size of the stored answers that are files", files)
-        yield _gauge("geodesic_meshes", "Meshes in the store", len(catalog.ids))
-        yield _gauge("geodesic_meshes_bytes", "Size of the meshes in the store", catalog.total)
+        yield Gauge("geodesic_results_bytes", "Size of the stored answers that are files", files)
+        yield Gauge("geodesic_meshes", "Meshes in the store", len(catalog.ids))
+        yield Gauge("geodesic_meshes_bytes", "Size of the meshes in the store", catalog.total)
         jobs = {status: self._jobs.get(status, 0) for status in get_args(JobStatus)}
         yield _gauges("geodesic_jobs", "Jobs that have not been removed", "status", jobs)
         evictions = {
@@ -142,29 +120,24 @@ def _of_resources(resources: Resources) -> Iterator[Metric]:
     resident = "Resident memory, by kind of process; shared pages count in each"
     yield _gauges("geodesic_resident_memory_bytes", resident, "process", resources.memory)
     is_open, most = "Open file descriptors of the API process", "Most descriptors it may have"
-    yield _gauge("geodesic_open_fds", is_open, resources.open_fds)
-    yield _gauge("geodesic_max_fds", most, resources.max_fds)
+    yield Gauge("geodesic_open_fds", is_open, resources.open_fds)
+    yield Gauge("geodesic_max_fds", most, resources.max_fds)
     free = "Bytes that can still be written to the disk of the store"
-    yield _gauge("geodesic_store_free_bytes", free, resources.free_bytes)
+    yield Gauge("geodesic_store_free_bytes", free, resources.free_bytes)
 
 
-def _gauge(name: str, meaning: str, value: float) -> Metric:
-    return GaugeMetricFamily(name, meaning, value)
-
-
-def _counter(name: str, meaning: str, value: float) -> Metric:
-    return CounterMetricFamily(name, meaning, value)
-
-
-def _gauges(name: str, meaning: str, label: str, values: Mapping[str, float]) -> Metric:
-    family = GaugeMetricFamily(name, meaning, labels=[label])
+def _family(
+    kind: type[Count | Gauge],
+    name: str,
+    meaning: str,
+    label: str,
+    values: Mapping[str, float],
+) -> Metric:
+    family = kind(name, meaning, labels=[label])
     for value in values:
         family.add_metric([value], values[value])
     return family
 
 
-def _counters(name: str, meaning: str, label: str, values: Mapping[str, float]) -> Metric:
-    family = CounterMetricFamily(name, meaning, labels=[label])
-    for value in values:
-        family.add_metric([value], values[value])
-    return family
+_gauges = partial(_family, Gauge)
+_counters = partial(_family, Count)

@@ -23,7 +23,8 @@ from app.schemas.service import ProblemDocument
 from app.service.answering import PhaseSeconds
 from app.service.service import Manifest
 from app.store.meshes import PUBLIC_ARRAYS
-from app.store.results import RemoteBody, RemoteFile, Result, ResultStore
+from app.store.objects import RemoteBody, RemoteFile
+from app.store.results import Result, ResultStore
 
 NEGOTIATED = {"Vary": "Accept, Accept-Encoding, Prefer"}
 CACHED = {"Cache-Control": "private, max-age=3600"}

@@ -12,7 +12,6 @@ from fastapi import FastAPI
 from app.access import is_loopback
 from app.http.connections import Connections
 from app.http.protocol import BoundedHttpProtocol
-from app.http.reading import PacedReading
 from app.service.service import Service
 from app.settings import Settings
 
@@ -49,11 +48,7 @@ class DrainingServer(uvicorn.Server):
 
 def server_of(app: FastAPI, host: str, port: int, settings: Settings) -> DrainingServer:
     """Return the server of an application, which listens once it runs."""
-    connections = Connections(settings)
-
-    def connect(**arguments: Any) -> PacedReading:
-        return PacedReading(BoundedHttpProtocol(connections=connections, **arguments))
-
+    connect = partial(BoundedHttpProtocol, connections=Connections(settings))
     config = uvicorn.Config(
         app,
         host,

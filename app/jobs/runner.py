@@ -46,7 +46,7 @@ _STOPPED_TOO_OFTEN = Problem(
     f"the service stopped while the job ran, {_MOST_RUNS} times",
     hint="if the job itself used too much, ask for less at once",
 )
-_SIGNS_OF_THE_END = frozenset({"draining", "engine_unavailable", "worker_died"})
+_SIGNS_OF_THE_END = frozenset({"engine_unavailable", "worker_died"})
 """Problems of jobs that the end of the service interrupts: a signal may have gone to workers too"""
 
 
@@ -196,6 +196,8 @@ class JobRunner:
             result = working.result()
         except Exception as error:
             problem = problem_of(error)
+            if problem.code == "draining":  # the engine hears of the end first
+                return
             if self._is_stopping and problem.code in _SIGNS_OF_THE_END:
                 return
             if problem.code == "internal_error":

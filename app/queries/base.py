@@ -227,6 +227,11 @@ class Query(ABC, Generic[R]):
             warnings.simplefilter("ignore", gc.errors.GeodesicWarning)  # the answer has notes
             return self.solve(self.noted(opened, points), points, context)
 
+    def members(self, opened: OpenMesh, **more: Any) -> dict[str, Any]:
+        """Return the members of an answer: those that each has, and more between them."""
+        names = {"kind": self.kind, "mesh_id": self.mesh_id}
+        return {**names, **more, "warnings": opened.warnings}
+
     def noted(self, opened: OpenMesh, points: SurfacePoints) -> OpenMesh:
         """Return a mesh whose warnings also tell of the resolved points that are hardly meant."""
         notes = notes_on(opened.mesh, self.written_points(), points, name_of)

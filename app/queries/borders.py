@@ -1,20 +1,14 @@
 """Borders between the territories of sources."""
 
 import math
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import geodesic_core as gc
 from app.encoding import Answer
-from app.queries.accuracy import affinity_keys_of, solve_field, stats_of
-from app.queries.base import ExecutionContext, Query
-from app.queries.cost_model import (
-    FACES_ON_LEVEL,
-    PER_FACE_DIVIDED,
-    PER_WINDOW_DIVIDED,
-    share_reached,
-    sweep_seconds,
-)
+from app.queries.accuracy import solve_field, stats_of
+from app.queries.base import ExecutionContext
+from app.queries.cost_model import PER_FACE_DIVIDED, faces_crossed, sweep_seconds
+from app.queries.from_sources import FromSources
 from app.queries.lines import (
     OFFERS,
     VALUES_OF_LINE_POINT,
@@ -24,24 +18,19 @@ from app.queries.lines import (
 from app.queries.points import (
     SurfacePoints,
     describe_source,
-    point_count,
-    points_in_sources,
     to_sources,
 )
 from app.queries.validation import (
-    WrittenPoints,
-    check_count,
     check_json_size,
 )
 from app.queries.views import lines_of_borders
 from app.schemas.requests import Accuracy, BordersRequest
-from app.settings import Settings
 from app.store.meshes import OpenMesh
 
 EXACT = Accuracy()
 
 
-class BordersQuery(Query[BordersRequest]):
+class BordersQuery(FromSources[BordersRequest]):
     """The points that are equally near to two of ``sources``, as polylines."""
 
     kind = "borders"
@@ -49,30 +38,12 @@ class BordersQuery(Query[BordersRequest]):
     offers = OFFERS
     hint = "set a larger chord_error, or a max_distance"
 
-    def check_limits(self, settings: Settings) -> None:
-        """Refuse too many sources."""
-        check_count("sources", point_count(*self.request.sources), settings, "max_sources")
-
-    @property
-    def affinity_keys(self) -> tuple[str, ...]:
-        """The exact field of these sources, and the mesh."""
-        return affinity_keys_of(self, self.request.sources)
-
-    def written_points(self) -> WrittenPoints:
-        """Yield the sources."""
-        return points_in_sources(self.request.sources)
-
     def rough_seconds(self) -> float:
         """Return the cost of two sweeps to the limit, and of the lines."""
         request = self.request
-        share = share_reached(self.size, point_count(*request.sources), request.max_distance)
         lines = math.sqrt(len(request.sources) - 1)  # as the length of all borders grows
-        crossed = min(1.0, lines * FACES_ON_LEVEL / math.sqrt(self.size.faces)) * share
-        sweep = sweep_seconds(self.size.faces, EXACT, share, crossed=crossed)
-        # The windows over an edge grow with the distance to its source.
-        windows = math.sqrt(share * self.size.faces / len(request.sources))
-        each = PER_FACE_DIVIDED + PER_WINDOW_DIVIDED * windows
-        return sweep + each * crossed * self.size.faces
+        sweep = sweep_seconds(self.size.faces, EXACT, self.share)
+        return 2 * sweep + PER_FACE_DIVIDED * faces_crossed(self.size.faces, lines, self.share)
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep, then draw the borders, if they fit into the answer."""
@@ -86,39 +57,16 @@ class BordersQuery(Query[BordersRequest]):
         values = VALUES_OF_LINE_POINT * sum(len(border.points) for border in borders)
         check_json_size(values, context.max_values, self.hint)
         found = [describe_border(border) for border in borders]
-        return self._answer(opened, starts, chord_error, found, stats_of(field.stats))
-
-    def _answer(
-        self,
-        opened: OpenMesh,
-        starts: Sequence[gc.Source],
-        chord_error: float,
-        found: Sequence[Mapping[str, Any]],
-        stats: Mapping[str, Any],
-    ) -> Answer:
-        return Answer(
-            {
-                "kind": self.kind,
-                "mesh_id": self.mesh_id,
-                "chord_error": chord_error,
-                "sources": [describe_source(opened.mesh, start) for start in starts],
-                "borders": found,
-                "stats": stats,
-                "warnings": opened.warnings,
-            },
-            shown=("borders",),
-            lines=lambda: lines_of_borders(found),
+        members = self.members(
+            opened,
+            chord_error=chord_error,
+            sources=[describe_source(opened.mesh, start) for start in starts],
+            borders=found,
+            stats=stats_of(field.stats),
         )
+        return Answer(members, shown=("borders",), lines=lambda: lines_of_borders(found))
 
 
 def describe_border(border: gc.Border) -> dict[str, Any]:
     """Return the members of a border."""
     return {"sources": border.sources, **describe_line(border)}
-
-
-def _seconds_per_face(faces: float, sources: int) -> float:
-    """Return the seconds for a face that borders cross, of all the ``faces`` that are reached.
-
-    The windows over an edge grow with the distance to its source.
-    """
-    return PER_FACE_DIVIDED + PER_WINDOW_DIVIDED * math.sqrt(faces / sources)

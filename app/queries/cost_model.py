@@ -26,40 +26,33 @@ PER_FACE_UNSWEPT = 0.03e-6
 """To allocate the state of a face."""
 PER_SEARCH, PER_FACE_SEARCHED = 0.5e-3, 0.08e-6
 """For a path between two points: each, and for each face of the mesh."""
-PER_WINDOW_RETAINED = 50e-9
-"""To retain the windows of an exact sweep, for the n√n of n faces: memory takes most of it."""
 PER_FACE_CROSSED = 8e-6
 """For each face that an isoline crosses."""
-PER_FACE_DIVIDED, PER_WINDOW_DIVIDED = 40e-6, 2.5e-6
-"""For each face that a border crosses; for √(n / k) more of k sources, by their windows."""
+PER_FACE_DIVIDED = 0.2e-3
+"""For each face that a border crosses, and the windows over it."""
 PER_FACE_BLOCKED = 0.4e-6
 """To make a mesh with barriers: for each of its faces."""
 PER_PATH = 0.3e-3
 """To trace a path, and to describe it."""
-FACES_RETAINED = 1.5
-"""Faces whose windows isolines need, for each that a level crosses."""
 FACES_ON_LEVEL = 4.0
 """Faces that an isoline crosses, for the √n of n faces: about those of a great circle."""
 
 
-def sweep_seconds(
-    faces: int, request: Accuracy, share: float = 1.0, *, crossed: float | None = None
-) -> float:
-    """Return the seconds of a sweep over a share of some faces.
-
-    ``crossed`` is the share of the faces that isolines cross; None without isolines.
-    """
+def sweep_seconds(faces: int, request: Accuracy, share: float) -> float:
+    """Return the seconds of a sweep over a share of some faces."""
     swept = share * faces
     if request.method == "exact":
         seconds = PER_SWEEP + swept * (PER_FACE + PER_WINDOWS * math.sqrt(swept))
-        if crossed is not None:  # a second sweep retains the windows of those faces
-            windows = min(FACES_RETAINED * crossed, share) * faces * math.sqrt(swept)
-            seconds += seconds + PER_WINDOW_RETAINED * windows
     elif isinstance(request, AccuracyOrEffort) and request.effort is not None:
         seconds = PER_SWEEP + (PER_FACE_PASSED + PER_PLACE * request.effort) * swept
     else:
         seconds = PER_SWEEP + PER_FACE_MERGED * swept
     return seconds + PER_FACE_UNSWEPT * faces
+
+
+def faces_crossed(faces: int, lines: float, share: float) -> float:
+    """Return the faces that some lines cross, of a share of all."""
+    return min(faces, lines * FACES_ON_LEVEL * math.sqrt(faces)) * share
 
 
 def search_seconds(faces: int, count: int) -> float:

@@ -11,14 +11,14 @@ import geodesic_core as gc
 from app.encoding import CSV, JSON, NPY, OCTETS, PLY, Answer, Indices
 from app.errors import Fault, problem
 from app.queries.accuracy import (
-    affinity_keys_of,
     bound_of,
     solve_field,
     stats_of,
     with_default_accuracy,
 )
-from app.queries.base import VALUES_OF_POINT, ExecutionContext, Query
-from app.queries.cost_model import PER_POINT, share_reached, sweep_seconds
+from app.queries.base import VALUES_OF_POINT, ExecutionContext
+from app.queries.cost_model import PER_POINT, sweep_seconds
+from app.queries.from_sources import FromSources
 from app.queries.points import (
     SurfacePoints,
     components_of,
@@ -26,21 +26,18 @@ from app.queries.points import (
     describe_point,
     describe_source,
     numbered,
-    point_count,
-    points_in_sources,
     to_sources,
 )
-from app.queries.validation import WrittenPoints, check_count, invalid_fields
+from app.queries.validation import WrittenPoints, invalid_fields
 from app.queries.views import columns_of, surface_of, table_of_distances
 from app.schemas.requests import DistancesRequest
-from app.settings import Settings
 from app.store.meshes import OpenMesh
 
 _VALUES_INCLUDED = {"nearest_source": 1, "gradient": 3}
 """Values in JSON for each distance, by name."""
 
 
-class DistancesQuery(Query[DistancesRequest]):
+class DistancesQuery(FromSources[DistancesRequest]):
     """Distances from ``sources`` to all vertices, or to ``targets`` only."""
 
     kind = "distances"
@@ -55,10 +52,6 @@ class DistancesQuery(Query[DistancesRequest]):
         included = list(dict.fromkeys(request.include))
         return with_default_accuracy(request.model_copy(update={"include": included}))
 
-    def check_limits(self, settings: Settings) -> None:
-        """Refuse too many sources."""
-        check_count("sources", point_count(*self.request.sources), settings, "max_sources")
-
     @property
     def offers(self) -> Sequence[str]:
         """The media types of the answer; PLY has room for distances of all vertices only."""
@@ -67,98 +60,55 @@ class DistancesQuery(Query[DistancesRequest]):
     def check_format(self, media_type: str) -> None:
         """Refuse a second array in binary."""
         message = "does not come with a bare array; ask for json, csv or ply"
-        faults = [Fault("/include", f"{name} {message}") for name in self._included]
+        faults = [Fault("/include", f"{name} {message}") for name in self.request.include]
         if faults and media_type in (NPY, OCTETS):
             raise problem("invalid_request", f"{media_type} holds one array", errors=tuple(faults))
 
     def value_count(self) -> int:
         """Return the number of distances, and of the values that are included with each."""
-        columns = 1 + sum(_VALUES_INCLUDED[name] for name in self._included)
+        columns = 1 + sum(_VALUES_INCLUDED[name] for name in self.request.include)
         if self.request.targets is None:
             return columns * self.size.vertices
         return (columns + VALUES_OF_POINT) * len(self.request.targets)
 
-    @property
-    def affinity_keys(self) -> tuple[str, ...]:
-        """The field of these sources, and the mesh."""
-        return affinity_keys_of(self, self.request.sources)
-
     def written_points(self) -> WrittenPoints:
         """Yield the sources, then the targets."""
-        request = self.request
-        return chain(
-            points_in_sources(request.sources), numbered("/targets", request.targets or ())
-        )
+        return chain(super().written_points(), numbered("/targets", self.request.targets or ()))
 
     def rough_seconds(self) -> float:
         """Return the cost of a sweep to the limit."""
         request = self.request
-        sources = point_count(*request.sources)
-        share = share_reached(self.size, sources, request.max_distance)
-        points = sources + len(request.targets or ())
-        return sweep_seconds(self.size.faces, request, share) + PER_POINT * points
+        points = self.source_count + len(request.targets or ())
+        return sweep_seconds(self.size.faces, request, self.share) + PER_POINT * points
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep once."""
-        request = self.request
-        sources, targets = self._parted(points)
-        starts = to_sources(opened.mesh, request.sources, sources)
+        request, mesh = self.request, opened.mesh
+        count = self.source_count
+        sources, targets = points[:count], None if request.targets is None else points[count:]
+        starts = to_sources(mesh, request.sources, sources)
+        limit = request.max_distance
         field = solve_field(
-            opened,
-            request,
-            starts,
-            context,
-            max_distance=request.max_distance,
-            targets=targets or (),
+            opened, request, starts, context, max_distance=limit, targets=targets or ()
         )
         distances = _at(targets, field.distances, field.distance_at)
-        included: dict[str, NDArray[Any]] = {}
-        if "nearest_source" in self._included:
+        members = self.members(
+            opened,
+            method=request.method,
+            error_bound=bound_of(field.error_bound),
+            sources=[describe_source(mesh, start) for start in starts],
+            **_described(mesh, targets),
+            distances=distances,
+            unreachable=_unreachable(mesh, sources, targets, distances),
+            stats=stats_of(field.stats),
+        )
+        included: dict[str, Any] = {}
+        if "nearest_source" in request.include:
             nearest = _at(targets, field.nearest_source, field.nearest_source_at)
-            included["nearest_source"] = nearest
-        if "gradient" in self._included:
+            included["nearest_source"] = Indices(nearest)
+        if "gradient" in request.include:
             included["gradient"] = field.gradient
-        bound, stats = bound_of(field.error_bound), stats_of(field.stats)
-        return self._answer(opened, points, starts, distances, included, bound, stats)
-
-    @property
-    def _included(self) -> Sequence[str]:
-        return self.request.include
-
-    def _parted(self, points: SurfacePoints) -> tuple[SurfacePoints, SurfacePoints | None]:
-        """Return sources and targets, None where those are all vertices."""
-        count = point_count(*self.request.sources)
-        return points[:count], None if self.request.targets is None else points[count:]
-
-    def _answer(
-        self,
-        opened: OpenMesh,
-        points: SurfacePoints,
-        starts: Sequence[gc.Source],
-        distances: NDArray[np.float64],
-        included: Mapping[str, NDArray[Any]],
-        error_bound: Mapping[str, Any],
-        stats: Mapping[str, Any],
-    ) -> Answer:
-        mesh = opened.mesh
-        sources, targets = self._parted(points)
-        members: dict[str, Any] = {
-            "kind": self.kind,
-            "mesh_id": self.mesh_id,
-            "method": self.request.method,
-            "error_bound": error_bound,
-            "sources": [describe_source(mesh, start) for start in starts],
-        }
-        if targets is not None:
-            members["targets"] = [describe_point(mesh, point) for point in targets]
-        members |= {
-            "distances": distances,
-            "unreachable": _unreachable(mesh, sources, targets, distances),
-            "stats": stats,
-            "warnings": opened.warnings,
-        }
-        for name, array in included.items():
-            members[name] = Indices(array) if name == "nearest_source" else array
+        members |= included
         columns = columns_of(members)
         return Answer(
             members,
@@ -167,6 +117,13 @@ class DistancesQuery(Query[DistancesRequest]):
             table=table_of_distances("vertex" if targets is None else "target", columns),
             surface=surface_of(mesh, columns) if targets is None else None,
         )
+
+
+def _described(mesh: gc.TriangleMesh, targets: SurfacePoints | None) -> dict[str, Any]:
+    """Return the member for targets; none where they are all vertices."""
+    if targets is None:
+        return {}
+    return {"targets": [describe_point(mesh, point) for point in targets]}
 
 
 def _at(

@@ -1,7 +1,6 @@
 """Lines of equal distance."""
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,14 +9,14 @@ from numpy.typing import NDArray
 import geodesic_core as gc
 from app.encoding import Answer
 from app.queries.accuracy import (
-    affinity_keys_of,
     bound_of,
     solve_field,
     stats_of,
     with_default_accuracy,
 )
-from app.queries.base import ExecutionContext, Query
-from app.queries.cost_model import FACES_ON_LEVEL, PER_FACE_CROSSED, share_reached, sweep_seconds
+from app.queries.base import ExecutionContext
+from app.queries.cost_model import PER_FACE_CROSSED, faces_crossed, sweep_seconds
+from app.queries.from_sources import FromSources
 from app.queries.lines import (
     OFFERS,
     VALUES_OF_LINE_POINT,
@@ -27,12 +26,9 @@ from app.queries.lines import (
 from app.queries.points import (
     SurfacePoints,
     describe_source,
-    point_count,
-    points_in_sources,
     to_sources,
 )
 from app.queries.validation import (
-    WrittenPoints,
     check_count,
     check_json_size,
     invalid_fields,
@@ -46,7 +42,7 @@ _VALUES_OF_LEVEL = 1
 """Values in JSON of a level itself."""
 
 
-class IsolinesQuery(Query[IsolinesRequest]):
+class IsolinesQuery(FromSources[IsolinesRequest]):
     """The points at some distances from ``sources``, as polylines."""
 
     kind = "isolines"
@@ -65,25 +61,15 @@ class IsolinesQuery(Query[IsolinesRequest]):
 
     def check_limits(self, settings: Settings) -> None:
         """Refuse too many sources or levels."""
-        check_count("sources", point_count(*self.request.sources), settings, "max_sources")
+        super().check_limits(settings)
         check_count("levels", self._level_count, settings, "max_levels")
 
-    @property
-    def affinity_keys(self) -> tuple[str, ...]:
-        """The field of these sources, and the mesh."""
-        return affinity_keys_of(self, self.request.sources)
-
-    def written_points(self) -> WrittenPoints:
-        """Yield the sources."""
-        return points_in_sources(self.request.sources)
-
     def rough_seconds(self) -> float:
-        """Return the cost of a sweep to the limit, and of the lines."""
+        """Return the cost of two sweeps to the limit, and of the lines."""
         request = self.request
-        share = share_reached(self.size, point_count(*request.sources), request.max_distance)
-        crossed = min(1.0, self._level_count * FACES_ON_LEVEL / math.sqrt(self.size.faces)) * share
-        sweep = sweep_seconds(self.size.faces, request, share, crossed=crossed)
-        return sweep + PER_FACE_CROSSED * crossed * self.size.faces
+        sweep = sweep_seconds(self.size.faces, request, self.share)
+        crossed = faces_crossed(self.size.faces, self._level_count, self.share)
+        return 2 * sweep + PER_FACE_CROSSED * crossed
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep, then draw level by level, as long as the lines fit into the answer."""
@@ -106,8 +92,16 @@ class IsolinesQuery(Query[IsolinesRequest]):
             values += VALUES_OF_LINE_POINT * sum(len(line.points) for line in lines)
             check_json_size(values, context.max_values, self.hint)
             found.append(describe_level(level, lines))
-        bound, stats = bound_of(field.error_bound), stats_of(field.stats)
-        return self._answer(opened, starts, chord_error, found, bound, stats)
+        members = self.members(
+            opened,
+            method=self.request.method,
+            error_bound=bound_of(field.error_bound),
+            chord_error=chord_error,
+            sources=[describe_source(opened.mesh, start) for start in starts],
+            isolines=found,
+            stats=stats_of(field.stats),
+        )
+        return Answer(members, shown=("isolines",), lines=lambda: lines_of(found))
 
     @property
     def _level_count(self) -> int:
@@ -124,31 +118,6 @@ class IsolinesQuery(Query[IsolinesRequest]):
         except gc.errors.InvalidArgument as error:
             raise invalid_fields(["/count"], str(error)) from None
         return [float(level) for level in levels]
-
-    def _answer(
-        self,
-        opened: OpenMesh,
-        starts: Sequence[gc.Source],
-        chord_error: float,
-        found: Sequence[Mapping[str, Any]],
-        error_bound: Mapping[str, Any],
-        stats: Mapping[str, Any],
-    ) -> Answer:
-        return Answer(
-            {
-                "kind": self.kind,
-                "mesh_id": self.mesh_id,
-                "method": self.request.method,
-                "error_bound": error_bound,
-                "chord_error": chord_error,
-                "sources": [describe_source(opened.mesh, start) for start in starts],
-                "isolines": found,
-                "stats": stats,
-                "warnings": opened.warnings,
-            },
-            shown=("isolines",),
-            lines=lambda: lines_of(found),
-        )
 
 
 def describe_level(level: float, lines: Sequence[gc.Isoline]) -> dict[str, Any]:

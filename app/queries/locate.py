@@ -39,7 +39,8 @@ class LocateQuery(Query[LocateRequest]):
         for i in range(len(self.request.points)):
             checkpoint(context.cancel)
             found.append(self._located(opened.mesh, i))
-        return self._answer(opened, found)
+        members = self.members(opened, points=found)
+        return Answer(members, shown=("points",), table=table_of_points("point", found))
 
     def _located(self, mesh: gc.TriangleMesh, i: int) -> Mapping[str, Any] | None:
         """Return the point nearest to a position; None where it is beyond the limit."""
@@ -53,15 +54,3 @@ class LocateQuery(Query[LocateRequest]):
         members = describe_point(mesh, point)
         distance = float(np.linalg.norm(np.subtract(members["position"], position)))
         return {**members, "distance": distance}
-
-    def _answer(self, opened: OpenMesh, found: Sequence[Mapping[str, Any] | None]) -> Answer:
-        return Answer(
-            {
-                "kind": self.kind,
-                "mesh_id": self.mesh_id,
-                "points": found,
-                "warnings": opened.warnings,
-            },
-            shown=("points",),
-            table=table_of_points("point", found),
-        )

@@ -48,7 +48,7 @@ class MatrixQuery(Query[MatrixRequest]):
                     message = "pairs need lists of points; give vertex indices instead of `all`"
                     raise invalid_fields([f"/{name}"], message)
             if "targets" not in request.model_fields_set:
-                raise invalid_fields(["/targets"], "pairs need targets, one for each source")
+                raise invalid_fields(["/layout"], "pairs need targets, one for each source")
             sources, targets = len(request.sources), len(request.targets)
             if sources != targets:
                 message = (

@@ -2,10 +2,8 @@
 
 from collections.abc import Sequence
 from itertools import chain
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.encoding import CSV, JSON, Answer
 from app.queries.accuracy import CERTAIN
@@ -59,41 +57,25 @@ class NearestQuery(Query[NearestRequest]):
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep to the k-th nearest."""
         source, *candidates = points
-        request = self.request
-        found = opened.solver.nearest(
+        mesh, request = opened.mesh, self.request
+        nearest = opened.solver.nearest(
             source, candidates, request.k, request.max_distance, **context.options
         )
-        return self._answer(opened, points, found.indices, found.distances)
-
-    def _answer(
-        self,
-        opened: OpenMesh,
-        points: SurfacePoints,
-        indices: NDArray[Any],
-        distances: NDArray[np.float64],
-    ) -> Answer:
-        mesh = opened.mesh
-        source, *candidates = points
+        indices, distances = nearest.indices, nearest.distances
         found = [
             {"candidate": i, "distance": distance, **describe_point(mesh, candidates[i])}
             for i, distance in zip(indices.tolist(), distances.tolist(), strict=True)
         ]
-        members = {
-            "kind": self.kind,
-            "mesh_id": self.mesh_id,
-            "method": "exact",
-            "error_bound": CERTAIN,
-            "source": describe_point(mesh, source),
-            "nearest": found,
-            "warnings": opened.warnings,
-        }
-        if len(indices) < self.request.k:
+        members = self.members(
+            opened,
+            method="exact",
+            error_bound=CERTAIN,
+            source=describe_point(mesh, source),
+            nearest=found,
+        )
+        if len(indices) < request.k:
             missed = np.ones(len(candidates), bool)
             missed[indices] = False
             connected = components_of(mesh, candidates) == components_of(mesh, [source])[0]
             members["unreachable"] = count_unreachable(missed, connected)
-        return Answer(
-            members,
-            shown=("nearest",),
-            table=table_of_points("candidate", found),
-        )
+        return Answer(members, shown=("nearest",), table=table_of_points("candidate", found))

@@ -89,15 +89,13 @@ class PathQuery(Query[PathRequest]):
         self, opened: OpenMesh, points: SurfacePoints, found: dict[str, Any], values: int = 0
     ) -> Answer:
         source, target, *waypoints = (describe_point(opened.mesh, point) for point in points)
-        members = {
-            "kind": self.kind,
-            "mesh_id": self.mesh_id,
-            "method": self.request.method,
-            "source": source,
-            "target": target,
-            "waypoints": waypoints,
-            "warnings": opened.warnings,
-        }
+        members = self.members(
+            opened,
+            method=self.request.method,
+            source=source,
+            target=target,
+            waypoints=waypoints,
+        )
         return Answer(members | found, ("points",), SHOWN, values, lines=lambda: [line_of(found)])
 
 

@@ -1,6 +1,5 @@
 """Shortest paths from one point to many, from one sweep."""
 
-from collections.abc import Mapping, Sequence
 from itertools import chain
 from typing import Any
 
@@ -73,7 +72,8 @@ class PathsQuery(Query[PathsRequest]):
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep once, then trace path by path, as long as they fit into the answer."""
-        starts, targets = self._parted(points)
+        count = point_count(self.request.source)
+        starts, targets = points[:count], points[count:]
         start = to_point_or_curve(opened.mesh, "/source", self.request.source, starts)
         field = solve_field(
             opened,
@@ -95,36 +95,19 @@ class PathsQuery(Query[PathsRequest]):
             values += VALUES_OF_POINT * len(path.points)
             check_json_size(values, context.max_values, self.hint)
             found.append(outline_of(path))
-        return self._answer(opened, start, targets, found, stats_of(field.stats))
-
-    def _parted(self, points: SurfacePoints) -> tuple[SurfacePoints, SurfacePoints]:
-        """Return the points of the source, and the targets."""
-        count = point_count(self.request.source)
-        return points[:count], points[count:]
-
-    def _answer(
-        self,
-        opened: OpenMesh,
-        start: gc.SurfacePoint | gc.Curve,
-        targets: SurfacePoints,
-        found: Sequence[Mapping[str, Any]],
-        stats: Mapping[str, Any],
-    ) -> Answer:
-        mesh = opened.mesh
         paths = [
-            {"target": describe_point(mesh, target), **path}
+            {"target": describe_point(opened.mesh, target), **path}
             for target, path in zip(targets, found, strict=True)
         ]
+        members = self.members(
+            opened,
+            method=self.request.method,
+            source=describe_point_or_curve(opened.mesh, start),
+            paths=paths,
+            stats=stats_of(field.stats),
+        )
         return Answer(
-            {
-                "kind": self.kind,
-                "mesh_id": self.mesh_id,
-                "method": self.request.method,
-                "source": describe_point_or_curve(mesh, start),
-                "paths": paths,
-                "stats": stats,
-                "warnings": opened.warnings,
-            },
+            members,
             shown=("paths",),
             lines=lambda: [line_of(path, i) for i, path in enumerate(found)],
         )

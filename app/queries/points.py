@@ -186,11 +186,6 @@ def components_of(mesh: gc.TriangleMesh, points: SurfacePoints) -> NDArray[np.in
     return mesh.components[np.array(vertices, np.int64)].astype(np.int64)
 
 
-def positions_of(mesh: gc.TriangleMesh, points: SurfacePoints) -> NDArray[np.float64]:
-    """Return the position (3,) of each point, mesh units."""
-    return np.array([describe_point(mesh, point)["position"] for point in points]).reshape(-1, 3)
-
-
 # Points in answers
 
 

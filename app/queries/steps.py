@@ -46,19 +46,7 @@ class StepsQuery(Query[StepsRequest]):
             steps = path.steps or ()
         except gc.errors.NoPath:
             pass  # the path itself tells why
-        members = {
-            "kind": self.kind,
-            "mesh_id": self.mesh_id,
-            "steps": [
-                {
-                    "leg": step.leg,
-                    "name": step.name,
-                    "bound": step.bound,
-                    "windows": step.windows,
-                    "faces": step.faces,
-                }
-                for step in steps
-            ],
-            "warnings": opened.warnings,
-        }
+        names = "leg", "name", "bound", "windows", "faces"
+        found = [{name: getattr(step, name) for name in names} for step in steps]
+        members = self.members(opened, steps=found)
         return Answer(members, values=sum(step.faces.size for step in steps))

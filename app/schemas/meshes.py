@@ -45,6 +45,7 @@ _MeshFormat = Literal[
     "vtr",
     "vti",
     "asc",
+    "npz",
 ]
 MESH_FORMATS: tuple[str, ...] = get_args(_MeshFormat)
 MeshFormat = Annotated[

@@ -1,17 +1,20 @@
 """Maintenance of a store: its contents, its damage, and what can be removed."""
 
 import shutil
-from collections.abc import Container, Iterable, Iterator
+from collections import Counter
+from collections.abc import Container, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from app.errors import ProblemError
 from app.jobs import Job, read_jobs
 from app.settings import variable_of
 from app.state import Database, StateError, require_intact
-from app.store.fields import code_of_field, field_files, name_of_field
+from app.store.fields import code_of_field, field_files
+from app.store.folder import Folder
 from app.store.layout import (
     FIELDS,
     JOB_DATABASE,
@@ -21,8 +24,9 @@ from app.store.layout import (
     StoreError,
     noted_state,
 )
-from app.store.meshes import MeshStore
-from app.store.results import complete_results, read_manifest
+from app.store.mesh_home import mesh_of
+from app.store.meshes import MANIFEST, MeshStore
+from app.store.results import ResultFiles, result_of
 
 
 @dataclass(frozen=True)
@@ -49,17 +53,6 @@ class Contents:
     fields: int
     field_bytes: int
     jobs: list[Job]
-
-
-@dataclass(frozen=True)
-class Damage:
-    """Damage of a mesh, a result, a field, or the records of jobs."""
-
-    folder: str
-    """Where in the store it is, see `app.store.layout`"""
-    name: str
-    detail: str
-    """A sentence that says what is wrong"""
 
 
 @dataclass(frozen=True)
@@ -113,59 +106,54 @@ def jobs_of(root: Path, state: str | None) -> list[Job]:
 
 def contents(root: Path, jobs: list[Job]) -> Contents:
     """Return the contents of the store ``root`` with these jobs; a service may run on it."""
-    store = MeshStore(root)
-    entries = []
-    for mesh_id, size in store.sizes().items():
-        manifest = {}
-        with suppress(ProblemError):
-            manifest = dict(store.manifest(mesh_id))
-        entries.append(
-            MeshEntry(
-                mesh_id,
-                manifest.get("report", {}).get("faces"),
-                manifest.get("created"),
-                manifest.get("owner"),
-                manifest.get("name"),
-                size,
-                store.last_used(mesh_id),
-            )
-        )
-    results = complete_results(root / RESULTS)
-    result_bytes = sum(body.stat().st_size for _, body in results.values())
+    files = list(Folder(root).found(MESHES))
+    sizes: Counter[str] = Counter()
+    for file in files:
+        sizes[mesh_of(file)] += file.size
+    meshes = [
+        _mesh_entry(root, mesh_of(file), sizes[mesh_of(file)], file.modified)
+        for file in files
+        if file.name.endswith(f"/{MANIFEST}")
+    ]
+    bodies = [body.stat().st_size for _, body in _complete_results(root).values()]
     fields = field_files(root).values()
-    return Contents(entries, len(results), result_bytes, len(fields), sum(fields), jobs)
+    return Contents(meshes, len(bodies), sum(bodies), len(fields), sum(fields), jobs)
 
 
-def inspect(root: Path) -> Iterator[Damage | None]:
-    """Read a store file by file, and yield the damage of each; None for each that is intact.
+def _mesh_entry(root: Path, mesh_id: str, size: int, modified: float) -> MeshEntry:
+    manifest: Mapping[str, Any] = {}
+    with suppress(ProblemError):
+        manifest = MeshStore(root).manifest(mesh_id)
+    return MeshEntry(
+        mesh_id,
+        manifest.get("report", {}).get("faces"),
+        manifest.get("created"),
+        manifest.get("owner"),
+        manifest.get("name"),
+        size,
+        datetime.fromtimestamp(modified, UTC),
+    )
+
+
+def inspect(root: Path) -> Iterator[str]:
+    """Read a store file by file, and yield a sentence on each damage.
 
     A service may run on the store.
     """
     store = MeshStore(root)
-    for mesh_id in store.sizes():
-        with suppress(ProblemError):  # deleted meanwhile
-            for error in store.inspect(mesh_id):
-                yield None if error is None else Damage(MESHES, mesh_id, str(error))
-    for name, files in complete_results(root / RESULTS).items():
-        is_intact = read_manifest(root / RESULTS, name) is not None
-        if is_intact or not files[0].exists():  # evicted meanwhile
-            yield None
-        else:
-            yield Damage(
-                RESULTS, name, f"result {name} is damaged: it has changed since it was written"
-            )
+    for mesh_id in store.ids():
+        yield from map(str, store.inspect(mesh_id))
+    results = ResultFiles(Folder(root))
+    for name, (manifest, _) in _complete_results(root).items():
+        if results.read_now(name) is None and manifest.exists():  # not evicted meanwhile
+            yield f"result {name} is damaged: it has changed since it was written"
     for path in field_files(root):
-        if code_of_field(path) is not None or not path.exists():
-            yield None
-        else:
-            name = name_of_field(path)
-            yield Damage(
-                FIELDS, name, f"field {name} is damaged: it has changed since it was written"
-            )
+        if code_of_field(path) is None and path.exists():
+            yield f"field {_field_name(path)} is damaged: it has changed since it was written"
     try:
         require_intact(root / JOB_DATABASE)
     except StoreError as error:
-        yield Damage(JOB_DATABASE, JOB_DATABASE, str(error))
+        yield str(error)
 
 
 def leftovers(root: Path, code: str, jobs: Iterable[Job]) -> Iterator[Leftover]:
@@ -185,25 +173,38 @@ def leftovers(root: Path, code: str, jobs: Iterable[Job]) -> Iterator[Leftover]:
     Leftover
         The files of one reason. The result of a job is none, unless it is damaged.
     """
-    meshes = MeshStore(root).sizes()
-    results, fields = complete_results(root / RESULTS), field_files(root)
-    of_jobs = {job.result for job in jobs}
-    for name, files in results.items():
-        manifest = read_manifest(root / RESULTS, name)
-        if manifest is not None and name in of_jobs:
-            continue
-        reason = _reason(name, None if manifest is None else manifest.code, meshes, code)
-        if reason is not None:
-            yield Leftover(reason, files)
+    meshes, of_jobs = set(MeshStore(root).ids()), {job.result for job in jobs}
+    results, fields, files = _complete_results(root), field_files(root), ResultFiles(Folder(root))
+    for name, paths in results.items():
+        found = files.read_now(name)
+        if found is None or name not in of_jobs:
+            written_by = None if found is None else found.manifest.code
+            reason = _reason(name, written_by, meshes, code)
+            if reason is not None:
+                yield Leftover(reason, paths)
     for path in fields:
-        reason = _reason(name_of_field(path), code_of_field(path), meshes, code)
+        reason = _reason(_field_name(path), code_of_field(path), meshes, code)
         if reason is not None:
             yield Leftover(reason, (path,))
-    complete = {*fields, *(file for files in results.values() for file in files)}
+    complete = {*fields, *(path for paths in results.values() for path in paths)}
     folders = (root / TEMPORARY, *(root / RESULTS).glob("*"), *(root / FIELDS).glob("*"))
     for path in (path for folder in folders for path in folder.glob("*")):
         if path not in complete:
             yield Leftover("half-written", (path,))
+
+
+def _complete_results(root: Path) -> dict[str, tuple[Path, Path]]:
+    """Return manifest and body of each complete result, by name."""
+    found = {path: path.with_suffix(".body") for path in (root / RESULTS).glob("*/*.json")}
+    return {
+        result_of(manifest.relative_to(root).as_posix()): (manifest, body)
+        for manifest, body in sorted(found.items())
+        if body.exists()
+    }
+
+
+def _field_name(path: Path) -> str:
+    return f"{path.parent.name}/{path.stem}"
 
 
 def _reason(name: str, written_by: str | None, meshes: Container[str], code: str) -> str | None:

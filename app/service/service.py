@@ -21,24 +21,22 @@ from app.queries import MeshSize
 from app.repeating import repeat
 from app.service.answering import Answering, PhaseSeconds
 from app.service.concurrency import ConcurrencyLimit
-from app.service.maintenance import Damage
 from app.service.progress import ignore_progress
 from app.service.query_jobs import QueryJobs
 from app.service.request_context import RequestContext
 from app.service.resources import share_arenas
-from app.service.scrub import scrubbing
 from app.service.time_limit import time_limit
 from app.settings import Settings
 from app.state import Allowances, Database, MeshRecords
 from app.store import layout
 from app.store.choice import store_of
 from app.store.fields import FieldStore
-from app.store.interface import Store
 from app.store.mesh_catalog import MeshCatalog
 from app.store.mesh_index import MeshIndex
 from app.store.ownership import Share
 from app.store.results import ResultStore
 from app.store.scratch import Scratch
+from app.store.store import Store
 
 _CATALOG_PERIOD_S = 2.0
 """Seconds between two looks at what other services did to meshes, where they are shared"""
@@ -116,11 +114,10 @@ class Service:
         """Own the store, supply workers and run jobs inside the block."""
         share_arenas()
         with self.owning_store() as share:
-            is_alone = share is None or share.is_first
-            self.scratch.prepare(is_alone=is_alone)
+            self.scratch.prepare(is_alone=share.is_first)
             self.mesh_catalog.prepare()
-            self.results.prepare(is_alone=is_alone)
-            if is_alone:
+            self.results.prepare()
+            if share.is_first:
                 self.fields.prepare(self.mesh_catalog.ids)
             async with self._using_database(share):
                 await self.engine.start()
@@ -128,10 +125,7 @@ class Service:
                 collect()
                 freeze()
                 try:
-                    async with (
-                        self._running_jobs(),
-                        scrubbing(self.settings.folder, self._repair),
-                    ):
+                    async with self._running_jobs():
                         self.results.make_room()  # now it is known which are those of jobs
                         yield
                 finally:
@@ -162,7 +156,7 @@ class Service:
             self.jobs.end_events()
 
     @contextmanager
-    def owning_store(self) -> Iterator[Share | None]:
+    def owning_store(self) -> Iterator[Share]:
         """Own the store inside the block, or share it with the other services of a cluster.
 
         Raises ``StoreError`` where the store is not usable, and ``StateError`` where the database
@@ -174,14 +168,14 @@ class Service:
             yield share
 
     @asynccontextmanager
-    async def _using_database(self, share: Share | None) -> AsyncIterator[None]:
+    async def _using_database(self, share: Share) -> AsyncIterator[None]:
         """Use the database inside the block; keep the catalogue up with other services there."""
         following = None
         try:
             if self.database.is_shared:
-                if share is None or share.is_first:
+                if share.is_first:
                     await self.mesh_catalog.reconcile()
-                if share is not None:
+                if self._is_one_of_many:
                     share.let_others_in()
                 following = asyncio.create_task(
                     repeat(self.mesh_catalog.keep_up, _CATALOG_PERIOD_S, "catalogue not kept up")
@@ -273,22 +267,10 @@ class Service:
     async def _forget(self, mesh_id: str) -> None:
         """Remove results and fields of a mesh that is gone, or that was damaged.
 
-        A disk may damage a mapped file without a trace in its status. Then nobody knows which
-        answers came before.
+        Nobody knows which answers came before the damage.
         """
         self.results.forget_mesh(mesh_id)
         await to_thread.run_sync(self.fields.forget_mesh, mesh_id)
-
-    async def _repair(self, damage: Damage) -> None:
-        """Make sure that nothing damaged is used, though its file's status looks as before."""
-        match damage.folder:
-            case layout.MESHES:
-                await self.store.meshes.distrust(damage.name)
-                await self._forget(damage.name)
-            case layout.RESULTS:
-                self.results.discard(damage.name)
-            case layout.FIELDS:
-                await to_thread.run_sync(self.fields.discard, damage.name)
 
 
 def _engine(settings: Settings, store: Store) -> Engine:

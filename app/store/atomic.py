@@ -2,24 +2,21 @@
 
 import os
 import tempfile
-import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
 _PARTIAL = "tmp"
 """Prefix of the names of unfinished files"""
-_ABANDONED_S = 86_400.0
-"""Seconds since the last write after which nobody writes an unfinished file any more"""
 
 
 @contextmanager
 def atomic_write(path: Path) -> Iterator[IO[bytes]]:
     """Yield a file that appears at ``path`` once the block has succeeded, and not otherwise.
 
-    A killed process may leave an unfinished file, for `remove_partial` or `remove_abandoned`.
+    A killed process may leave an unfinished file, which the next start removes.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.NamedTemporaryFile(dir=path.parent, prefix=_PARTIAL, delete=False) as file:
@@ -36,15 +33,6 @@ def remove_partial(folder: Path) -> None:
     """Remove the files that `atomic_write` did not finish from the folders in ``folder``."""
     for path in folder.glob(f"*/{_PARTIAL}*"):
         path.unlink()
-
-
-def remove_abandoned(folder: Path) -> None:
-    """Remove such files while others are being written: those left unfinished a day ago."""
-    latest = time.time() - _ABANDONED_S
-    for path in folder.glob(f"*/{_PARTIAL}*"):
-        with suppress(OSError):  # it has just been finished, or the disk can only be read
-            if path.stat().st_mtime < latest:
-                path.unlink()
 
 
 def sync(path: Path) -> None:

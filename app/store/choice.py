@@ -3,26 +3,25 @@
 from pathlib import Path
 
 from app.settings import Settings, variable_of
-from app.store.folder_store import FolderStore
-from app.store.interface import Store
 from app.store.layout import StoreError
+from app.store.store import Store
 
 
 def store_of(settings: Settings) -> Store:
     """Return the store that the settings name; raises ``StoreError`` where it cannot be."""
     if isinstance(settings.store, Path):
-        return FolderStore(settings.store)
+        return Store(settings.store)
     try:
-        from app.store.object_store import ObjectStore  # an extra
-        from app.store.objects import Objects
+        from app.store.bucket import Bucket  # an extra
+        from app.store.bucket_store import BucketStore
     except ImportError as error:
         extra = "pip install geodesic[cluster]"
         raise StoreError(f"{variable_of('store')} needs {error.name}: {extra}") from error
     try:
-        objects = Objects.at(settings.store)
+        objects = Bucket.at(settings.store)
     except ValueError as error:
         raise StoreError(
             f"{variable_of('store')} is not the URL of a store, or an environment variable for it "
             f"is missing: {error}"
         ) from None
-    return ObjectStore(objects, settings.folder, settings.copies_bytes, settings.store)
+    return BucketStore(objects, settings.folder, settings.copies_bytes, settings.store)

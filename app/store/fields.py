@@ -8,7 +8,6 @@ import shutil
 import struct
 import zlib
 from collections.abc import Collection, Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -17,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.store.atomic import atomic_write, remove_partial
-from app.store.last_use import note_use, order_of_use
+from app.store.folder import Folder
 from app.store.layout import FIELDS
 from app.store.log import warn
 
@@ -34,6 +33,7 @@ class FieldStore:
     """
 
     def __init__(self, root: Path, capacity: int) -> None:
+        self._files = Folder(root)
         self._root = root
         self.folder = root / FIELDS
         self._capacity = capacity
@@ -52,7 +52,7 @@ class FieldStore:
         path = self._path(mesh_id, key)
         try:
             arrays = {name: array for name, array in _read(path).items() if name != _CODE}
-            note_use(path)
+            self._files.note_use(f"{FIELDS}/{mesh_id}/{key}.npz")
         except FileNotFoundError:
             return None
         except (*_DAMAGED, OSError) as error:
@@ -71,10 +71,6 @@ class FieldStore:
             self._evict()
         except (OSError, MemoryError) as error:
             warn("field not stored", mesh_id=mesh_id, key=key, error=repr(error))
-
-    def discard(self, name: str) -> None:
-        """Remove the field of this name, mesh id and key."""
-        self._path(*name.split("/")).unlink(missing_ok=True)
 
     def forget_mesh(self, mesh_id: str) -> None:
         """Remove the fields of a mesh; one that is being written may be left to `prepare`."""
@@ -96,17 +92,8 @@ class FieldStore:
 
 def field_files(root: Path) -> dict[Path, int]:
     """Return the size of each field file in a store, the least recently used first."""
-    files = []
-    for path in (root / FIELDS).glob("*/*.npz"):
-        with suppress(FileNotFoundError):  # evicted a moment ago
-            status = path.stat()
-            files.append((order_of_use(status), path, status.st_size))
-    return {path: size for _, path, size in sorted(files)}
-
-
-def name_of_field(path: Path) -> str:
-    """Return the name of the field in a file: mesh id and key."""
-    return f"{path.parent.name}/{path.stem}"
+    found = Folder(root).found(FIELDS)
+    return {root / each.name: each.size for each in found if each.name.endswith(".npz")}
 
 
 def code_of_field(path: Path) -> str | None:

@@ -18,7 +18,7 @@ from contextlib import suppress
 from pathlib import Path
 from uuid import uuid4
 
-import orjson
+from app.store.atomic import sync
 
 LAYOUT = 7
 """Number of the layout that this code reads and writes. Raise it with every change of any file,
@@ -29,43 +29,35 @@ JOB_DATABASE = "jobs.sqlite3"
 MESHES, RESULTS, FIELDS = "meshes", "results", "fields"
 TEMPORARY = "tmp"
 
-WITH_OLDER_MESHES = (4, 5)
-"""Layouts whose meshes `app.store.conversion` makes current; in 4, each manifest had the number."""
-CONVERTIBLE = (*WITH_OLDER_MESHES, 6)
-"""Older layouts that this code takes over; in 6, the queries of jobs were not stored."""
-
 
 class StoreError(Exception):
     """An unusable store; the message says why, and what to do."""
 
 
-def layout_of(root: Path) -> int:
-    """Return the layout of the store in ``root``: the present one, or one that can be converted.
-
-    Raises
-    ------
-    StoreError
-        It has another layout.
-    """
-    found = _layout(root)
-    if found is None:
-        return LAYOUT
-    if found == LAYOUT or found in CONVERTIBLE:
-        return int(found)
-    raise StoreError(
-        f"the store {root} has layout {found}, but this release reads {LAYOUT}: use the release "
-        "that wrote it, or move the store away and upload its meshes again"
-    )
-
-
 def require_layout(root: Path) -> None:
-    """Raise ``StoreError`` where the store in ``root`` does not have the present layout."""
-    found = layout_of(root)
-    if found != LAYOUT:
+    """Raise ``StoreError`` where the store in ``root`` has another layout."""
+    found = _read(root, "VERSION")
+    if found is None and (root / MESHES).is_dir():
+        found = "4 or older"  # these had no such file
+    if found not in (None, str(LAYOUT)):
         raise StoreError(
-            f"the store {root} has layout {found}, but this release reads {LAYOUT}: start the "
-            "service on it once, which converts it"
+            f"the store {root} has layout {found}, but this release reads {LAYOUT}: use the "
+            "release that wrote it, or move the store away and upload its meshes again"
         )
+
+
+def write_layout(root: Path) -> None:
+    """Note the layout of a new store; raises ``StoreError`` where it cannot be written."""
+    if _read(root, "VERSION") is not None:
+        return
+    aside = root / "VERSION.new"
+    try:
+        aside.write_text(f"{LAYOUT}\n")
+        sync(aside)
+        aside.replace(root / "VERSION")
+        sync(root)
+    except OSError as error:
+        raise _unwritable(root, error) from error
 
 
 def note_state(root: Path, service: str | None) -> None:
@@ -126,22 +118,3 @@ def _unwritable(root: Path, error: OSError) -> StoreError:
 def is_store(root: Path) -> bool:
     """Tell whether ``root`` holds a store."""
     return (root / "VERSION").is_file() or (root / MESHES).is_dir()
-
-
-def _layout(root: Path) -> int | str | None:
-    try:
-        written = (root / "VERSION").read_text().strip()
-    except FileNotFoundError:
-        return _layout_of_manifests(root)
-    return int(written) if written.isdecimal() else repr(written)
-
-
-def _layout_of_manifests(root: Path) -> int | str | None:
-    """Return the layout of a store older than 5, where a mesh of it tells; None elsewhere."""
-    for path in (root / MESHES).glob("*/manifest.json"):
-        try:
-            version: int | str = orjson.loads(path.read_bytes())["version"]
-        except (ValueError, TypeError, KeyError):
-            continue  # damaged: reported when the mesh is read
-        return version
-    return None

@@ -28,6 +28,10 @@ class LRUCache(Generic[K, V]):
         """Yield the keys, the most recently used last."""
         return iter(self._values)
 
+    def get(self, key: K) -> V | None:
+        """Return the value of a key, if there is one; that is no use of it."""
+        return self._values.get(key)
+
     @property
     def nbytes(self) -> int:
         """Bytes of all values, each as measured last."""
@@ -42,6 +46,12 @@ class LRUCache(Generic[K, V]):
         self._values.move_to_end(key)
         self._measure(key)
         return self._values[key]
+
+    def put(self, key: K, value: V) -> None:
+        """Add a value as the most recently used, over any that the key has."""
+        self._values[key] = value
+        self._values.move_to_end(key)
+        self._measure(key)
 
     def evict(self, spare: int = 0) -> list[K]:
         """Drop values until the rest fit, but not the ``spare`` used last; return their keys."""

@@ -170,7 +170,6 @@ class MeshCatalog:
                 await self._find(mesh_id)
                 return self._use_again(mesh_id)
         try:
-            await self._home.settle(written)
             async with self._table():
                 change = await self._add(written)
         except ProblemError:  # after any other error, the mesh may be there
@@ -196,7 +195,7 @@ class MeshCatalog:
             await self._remove(old)
         self._entries[mesh_id] = entry
         try:
-            await self._home.put(written, is_new=is_new)
+            await self._home.put(written)
         except OSError:
             if is_new:
                 await self._remove(mesh_id)  # a power cut might lose it: fail now

@@ -7,23 +7,26 @@ on it.
 """
 
 import errno
+import re
 import zlib
 from collections import Counter, OrderedDict, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import IO, Protocol
+from typing import IO
 
-from anyio import to_thread
+from anyio import CapacityLimiter, to_thread
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from app.errors import StoreUnavailableError, over_limit, problem
-from app.store.atomic import atomic_write, remove_partial
-from app.store.last_use import note_use, order_of_use
+from app.store.atomic import atomic_write
+from app.store.layout import RESULTS
 from app.store.log import warn
-from app.store.verified import checksum_of
+from app.store.lru_cache import LRUCache
+from app.store.objects import Objects, RemoteBody
 
 Buffer = bytes | memoryview
 
@@ -34,9 +37,14 @@ SMALL = 2**16
 _CHUNK = 2**20
 """Bytes that are read at a time"""
 
+_CALLS = 32
+"""Calls of the store at the same time"""
+
 _ENTRY = 4096
 """Bytes that a result in memory takes besides its body: objects, names and headers"""
 
+_OBJECT = re.compile(rf"{RESULTS}/(.+?)(\.[0-9a-f]{{8}}-[0-9]+)?\.(json|body)")
+"""The name of an object, which has that of its result"""
 
 _MAKE_ROOM = "delete jobs whose answers you have read"
 
@@ -166,112 +174,115 @@ def _add_manifest(
     return Result(name, manifest, None, has_files=True)
 
 
-class ResultFiles(Protocol):
-    """The files of results: a folder, or objects that several machines reach."""
+class ResultFiles:
+    """The results in ``objects``.
 
-    def found(self, *, is_alone: bool) -> Iterable[tuple[str, int]]:
+    The same answer may come from two machines, with other figures about its computation. So the
+    body in an object store is named by its checksum, too: it is always that of its manifest.
+    """
+
+    def __init__(self, objects: Objects) -> None:
+        self._objects = objects
+        self._limiter = CapacityLimiter(_CALLS)
+
+    def found(self) -> Iterator[tuple[str, int]]:
         """Yield names and sizes of the results of a former service, the oldest first.
 
-        What is incomplete is removed, where no other service may be writing it.
+        What nobody will complete is removed.
         """
+        objects = list(self._objects.found(RESULTS))
+        names = {each.name: result_of(each.name) for each in objects}
+        sizes = {names[each.name]: each.size for each in objects if each.name.endswith(".body")}
+        complete = sizes.keys() & {names[name] for name in names if name.endswith(".json")}
+        for each in objects:
+            name = names[each.name]
+            if name not in complete:
+                if each.is_abandoned:
+                    self._objects.remove(each.name)
+            elif each.name.endswith(".json"):
+                yield name, sizes[name]
 
-    async def read(self, name: str) -> Result | None:
-        """Return a result; None where it is missing or damaged."""
+    async def read(self, name: str, known: Result | None = None) -> Result | None:
+        """Return a result, see `read_now`."""
+        return await to_thread.run_sync(self.read_now, name, known, limiter=self._limiter)
 
     async def size(self, name: str) -> int | None:
         """Return the size of the body of a result; None where it is missing."""
+        manifest = await to_thread.run_sync(self.manifest, name, limiter=self._limiter)
+        return None if manifest is None else manifest.size
 
-    async def write(self, name: str, body: bytes, manifest: ResultManifest) -> None:
-        """Write the files of a result in memory."""
+    async def write(self, name: str, body: bytes | Path, manifest: ResultManifest) -> None:
+        """Write the files of a result in memory, or of one whose body is a file."""
+        await to_thread.run_sync(self._write, name, body, manifest, limiter=self._limiter)
 
     def note_use(self, name: str) -> None:
         """Mark a result as the most recently used."""
+        self._objects.note_use(_manifest_name(name))
 
     def remove(self, name: str) -> None:
         """Remove a result, if it is there."""
+        self._objects.soon(self._remove, name)
 
-    def body(self, result: Result) -> "Path | RemoteBody":
-        """Return the body of a result that has files."""
+    def body(self, result: Result, on_damage: Callable[[], None]) -> Path | RemoteBody:
+        """Return the body of a result that has files, see ``Objects``."""
+        name = self.body_name(result.name, result.manifest)
+        return self._objects.body(name, result.manifest.size, result.manifest.crc32, on_damage)
 
+    def body_name(self, name: str, manifest: ResultManifest | None) -> str:
+        """Return the name of a body; in a folder, that of the result tells it."""
+        version = (
+            ""
+            if manifest is None or self._objects.is_local
+            else f".{manifest.crc32:08x}-{manifest.size}"
+        )
+        return f"{RESULTS}/{name}{version}.body"
 
-class RemoteFile(Protocol):
-    """A file that is elsewhere."""
+    def read_now(self, name: str, known: Result | None = None) -> Result | None:
+        """Return a result; None where it is missing or damaged.
 
-    async def seek(self, offset: int) -> object:
-        """Go on at an offset."""
+        A large body is not read again where it is ``known`` to be intact: clients may read it in
+        many ranges. One that is elsewhere is verified while it is sent, see ``Objects.body``.
+        """
+        manifest = self.manifest(name)
+        if manifest is None:
+            return None
+        body_name, body = self.body_name(name, manifest), None
+        if manifest.size <= SMALL:
+            body = self._objects.read(body_name)
+            is_intact = body is not None and zlib.crc32(body) == manifest.crc32
+        else:
+            is_intact = self._objects.size(body_name) == manifest.size
+            is_verified = known is not None and known.manifest == manifest
+            if is_intact and self._objects.is_local and not is_verified:
+                is_intact = self._objects.checksum(body_name) == manifest.crc32
+        return Result(name, manifest, body, has_files=True) if is_intact else None
 
-    async def read(self, size: int) -> bytes:
-        """Return the next bytes: as many, or fewer at the end."""
+    def manifest(self, name: str) -> ResultManifest | None:
+        """Return the manifest of a result; None where it is missing or damaged."""
+        return _decoded(self._objects.read(_manifest_name(name)))
 
-    async def aclose(self) -> None:
-        """End the use of the file."""
+    def _write(self, name: str, body: bytes | Path, manifest: ResultManifest) -> None:
+        body_name, content = self.body_name(name, manifest), manifest.model_dump_json().encode()
+        self._objects.write(body_name, body)
+        before = _decoded(self._objects.replace(_manifest_name(name), content))
+        if before is not None and self.body_name(name, before) != body_name:
+            self._objects.remove(self.body_name(name, before))
 
-
-class RemoteBody(Protocol):
-    """A body that is elsewhere, and read while it is sent."""
-
-    size: int
-
-    async def open(self) -> RemoteFile:
-        """Open the body for reading."""
-
-
-class FolderResults:
-    """The results in the folder ``root``."""
-
-    def __init__(self, root: Path) -> None:
-        self._root = root
-
-    def found(self, *, is_alone: bool) -> Iterator[tuple[str, int]]:
-        """Yield what is there, see ``ResultFiles``."""
-        self._root.mkdir(parents=True, exist_ok=True)
-        complete = []
-        for path in self._root.glob("*/*.body"):
-            name = path.relative_to(self._root).with_suffix("").as_posix()
-            manifest = _manifest_path(self._root, name)
-            if manifest.exists():
-                with suppress(FileNotFoundError):  # another service has evicted it a moment ago
-                    complete.append((order_of_use(manifest.stat()), name, path.stat().st_size))
-            elif is_alone:
-                path.unlink()
-        if is_alone:
-            remove_partial(self._root)
-        for _, name, size in sorted(complete):
-            yield name, size
-
-    async def read(self, name: str) -> Result | None:
-        """Return a result; None where it is missing or damaged."""
-        return await to_thread.run_sync(_read, self._root, name)
-
-    async def size(self, name: str) -> int | None:
-        """Return the size of a body; None where it is missing."""
-        return await to_thread.run_sync(_size, self._root, name)
-
-    async def write(self, name: str, body: bytes, manifest: ResultManifest) -> None:
-        """Write a result."""
-        await to_thread.run_sync(_write, self._root, name, [body], manifest.headers, manifest.code)
-
-    def note_use(self, name: str) -> None:
-        """Note a use as the time of the manifest: that of the body tells whether it was changed."""
-        note_use(_manifest_path(self._root, name))
-
-    def remove(self, name: str) -> None:
-        """Remove the files of a result."""
-        _manifest_path(self._root, name).unlink(missing_ok=True)
-        body_path(self._root, name).unlink(missing_ok=True)
-
-    def body(self, result: Result) -> Path:
-        """Return the file of a body."""
-        return body_path(self._root, result.name)
+    def _remove(self, name: str) -> None:
+        manifest = None if self._objects.is_local else self.manifest(name)
+        self._objects.remove(_manifest_name(name))
+        if self._objects.is_local or manifest is not None:
+            self._objects.remove(self.body_name(name, manifest))
 
 
 class ResultStore:
     """Results in ``files``, at most ``capacity`` bytes; the least recently used go first.
 
-    Those that the jobs of one owner pin, or reserve room for, have at most ``quota`` bytes. Small
-    results of up to ``memory`` bytes are held in memory: all those without files, and some of the
-    others. One process owns the store and its index. `find` and `add` acquire a result, which
-    protects its files until `release`; a pinned one stays until `unpin`.
+    Those that the jobs of one owner pin, or reserve room for, have at most ``quota`` bytes. In
+    memory are those used last, of up to ``memory`` bytes: small ones, with files or without, and of
+    large ones that they have been verified. One process owns the store and its index. `find` and
+    `add` acquire a result, which protects its files until `release`; a pinned one stays until
+    `unpin`.
     """
 
     def __init__(
@@ -280,9 +291,7 @@ class ResultStore:
         self._files = files
         self._capacity = capacity
         self._quota = quota
-        self._memory = memory
-        self._small: OrderedDict[str, Result] = OrderedDict()
-        self._small_total = 0
+        self._memory: LRUCache[str, Result] = LRUCache(memory, _bytes_in_memory)
         self._sizes: OrderedDict[str, int] = OrderedDict()
         self._total = 0
         self._in_use: Counter[str] = Counter()
@@ -292,16 +301,13 @@ class ResultStore:
         """Bytes by owner"""
         self.evictions = 0
         """Results removed so far to make room on the disk"""
-        self.memory_evictions = 0
-        """Results dropped so far to make room in memory"""
 
-    def prepare(self, *, is_alone: bool = True) -> None:
+    def prepare(self) -> None:
         """Index the results of a former service, the oldest first, and remove incomplete ones.
 
-        Where this service is not alone, another one may be writing those. `make_room` is to follow
-        once those that must stay are pinned.
+        `make_room` is to follow once those that must stay are pinned.
         """
-        for name, size in self._files.found(is_alone=is_alone):
+        for name, size in self._files.found():
             self._count(name, size)
 
     @property
@@ -309,23 +315,27 @@ class ResultStore:
         """Bytes of all bodies that are files."""
         return self._total
 
+    @property
+    def memory_evictions(self) -> int:
+        """Results dropped so far to make room in memory."""
+        return self._memory.evictions
+
     def body(self, result: Result) -> Path | RemoteBody:
         """Return the body of a result that has files."""
-        return self._files.body(result)
+        return self._files.body(result, partial(self._remove, result.name))
 
     async def find(self, name: str) -> Result | None:
         """Acquire a result; None where it is missing or damaged."""
-        if name in self._small:
-            self._small.move_to_end(name)
-            return self._acquire(self._small[name])
+        known = self._memory.get(name)
+        if known is not None and known.body is not None:
+            return self._acquire(known)
         if name not in self._sizes:
             return None
         self._in_use[name] += 1  # protects the files while a thread reads them
         try:
-            result = await self._files.read(name)
+            result = await self._files.read(name, known)
             if result is not None:
                 self._files.note_use(name)
-                self._cache_small(result)
                 return self._acquire(result)
         finally:
             self._decrement_use(name)
@@ -350,7 +360,6 @@ class ResultStore:
 
     def add(self, result: Result) -> Result:
         """Acquire a result that a worker has just written."""
-        self._cache_small(result)
         return self._acquire(result)
 
     def release(self, result: Result) -> None:
@@ -366,16 +375,13 @@ class ResultStore:
         if result.has_files:
             return result
         assert result.body is not None, "a result without files is in memory"  # noqa: S101
-        name, manifest = result.name, result.manifest
         try:
-            await self._files.write(name, result.body, manifest)
+            await self._files.write(result.name, result.body, result.manifest)
         except BaseException:
             self.release(result)
             raise
-        self._count(name, manifest.size)
         filed = replace(result, has_files=True)
-        if name in self._small:
-            self._small[name] = filed
+        self._hold(filed)
         return filed
 
     @contextmanager
@@ -450,20 +456,38 @@ class ResultStore:
 
     def discard(self, name: str) -> None:
         """Remove a result, unless it is pinned or in use."""
-        if self._is_free(name):
+        if name not in self._in_use and name not in self._pinned:
             self._remove(name)
 
     def forget_mesh(self, mesh_id: str) -> None:
         """Remove the results of a mesh, except those that are pinned or in use."""
-        names = {*self._sizes, *self._small}
-        for name in [name for name in names if name.startswith(f"{mesh_id}/")]:
-            self.discard(name)
+        for name in {*self._sizes, *self._memory}:
+            if name.startswith(f"{mesh_id}/"):
+                self.discard(name)
+
+    def make_room(self) -> None:
+        """Remove results until the rest fits, but none that is pinned or in use."""
+        if self._total <= self._capacity:
+            return
+        spared = self._pinned | self._in_use.keys()
+        for name in list(self._sizes):
+            if name not in spared:
+                self._remove(name)
+                self.evictions += 1
+            if self._total <= self._capacity:
+                return
 
     def _acquire(self, result: Result) -> Result:
-        if result.has_files:
-            self._count(result.name, result.manifest.size)
+        self._hold(result)
         self._in_use[result.name] += 1
         return result
+
+    def _hold(self, result: Result) -> None:
+        """Count a result, and hold it in memory as the most recently used."""
+        if result.has_files:
+            self._count(result.name, result.manifest.size)
+        self._memory.put(result.name, result)
+        self._memory.evict()
 
     def _count(self, name: str, size: int) -> None:
         self._total += size - self._sizes.pop(name, 0)
@@ -474,38 +498,15 @@ class ResultStore:
         if not self._in_use[name]:
             del self._in_use[name]
 
-    def make_room(self) -> None:
-        """Remove results until the rest fits, but none that is pinned or in use."""
-        if self._total <= self._capacity:
-            return
-        pinned = self._pinned
-        for name in list(self._sizes):
-            if name not in self._in_use and name not in pinned:
-                self._remove(name)
-                self.evictions += 1
-            if self._total <= self._capacity:
-                return
-
-    def _is_free(self, name: str) -> bool:
-        return name not in self._in_use and name not in self._pinned
-
-    def _cache_small(self, result: Result) -> None:
-        if result.body is None or result.name in self._small:
-            return
-        self._small[result.name] = result
-        self._small_total += _ENTRY + result.manifest.size
-        while self._small_total > self._memory:
-            self._drop_small(next(iter(self._small)))
-            self.memory_evictions += 1
-
-    def _drop_small(self, name: str) -> None:
-        if name in self._small:
-            self._small_total -= _ENTRY + self._small.pop(name).manifest.size
-
     def _remove(self, name: str) -> None:
-        self._drop_small(name)
+        if self._memory.get(name) is not None:
+            self._memory.drop(name)
         self._files.remove(name)
         self._total -= self._sizes.pop(name, 0)
+
+
+def _bytes_in_memory(result: Result) -> int:
+    return _ENTRY + len(result.body or b"")
 
 
 def result_name(mesh_id: str, key: str) -> str:
@@ -518,50 +519,22 @@ def body_path(root: Path, name: str) -> Path:
     return root / f"{name}.body"
 
 
-def complete_results(root: Path) -> dict[str, tuple[Path, Path]]:
-    """Return manifest and body of each complete result on disk, by name."""
-    manifests = sorted(root.glob("*/*.json"))
-    names = [path.relative_to(root).with_suffix("").as_posix() for path in manifests]
-    return {
-        name: (_manifest_path(root, name), body_path(root, name))
-        for name in names
-        if body_path(root, name).exists()
-    }
-
-
-def read_manifest(root: Path, name: str) -> ResultManifest | None:
-    """Return the manifest of a result; None where the result is missing or damaged."""
-    result = _read(root, name)
-    return None if result is None else result.manifest
-
-
 def _manifest_path(root: Path, name: str) -> Path:
     return root / f"{name}.json"
 
 
-def _size(root: Path, name: str) -> int | None:
-    """Return the size of the body of a result; None where it is missing."""
-    if not _manifest_path(root, name).exists():
-        return None
+def _manifest_name(name: str) -> str:
+    return f"{RESULTS}/{name}.json"
+
+
+def _decoded(content: bytes | None) -> ResultManifest | None:
     try:
-        return body_path(root, name).stat().st_size
-    except FileNotFoundError:
+        return None if content is None else ResultManifest.model_validate_json(content)
+    except ValidationError:
         return None
 
 
-def _read(root: Path, name: str) -> Result | None:
-    """Return a result from its files; None where it is missing or damaged.
-
-    A large body is read once for each version of its file: clients may read it in many ranges.
-    """
-    path = body_path(root, name)
-    try:
-        manifest = ResultManifest.model_validate_json(_manifest_path(root, name).read_bytes())
-        body = path.read_bytes() if manifest.size <= SMALL else None
-        size = path.stat().st_size if body is None else len(body)
-    except (FileNotFoundError, ValidationError):
-        return None
-    if size != manifest.size:
-        return None
-    checksum = checksum_of(str(path)) if body is None else zlib.crc32(body)
-    return Result(name, manifest, body, has_files=True) if checksum == manifest.crc32 else None
+def result_of(name: str) -> str:
+    """Return the name of the result that an object belongs to; of another object, its own name."""
+    found = _OBJECT.fullmatch(name)
+    return found[1] if found else name

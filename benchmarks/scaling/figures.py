@@ -17,6 +17,8 @@ import numpy as np
 
 import geodesic_core as gc
 from app.engine.placement import Occupancy, ranked
+from app.store.folder import Folder
+from app.store.layout import MESHES
 from app.store.mesh_catalog import MeshCatalog
 from app.store.mesh_home import MeshRecord
 from app.store.meshes import MeshStore
@@ -126,10 +128,10 @@ def _opening(mesh: gc.TriangleMesh) -> float:
         times = []
         for run in range(5):
             store = MeshStore(Path(folder, str(run)))
-            store.folder.mkdir(parents=True)
+            store.folder.parent.mkdir()
             written = store.write_aside(mesh, Path(folder, f"{run} aside"), None)
             assert written.folder is not None, "it is new"  # noqa: S101
-            written.folder.rename(store.folder / written.mesh_id)
+            store.install(written.mesh_id, written.folder)
             times.append(spent(partial(store.open, written.mesh_id), runs=1))
         return median(times)
 
@@ -177,12 +179,12 @@ def _copies() -> float:
     """Return the seconds for each copy, of meshes that have as many files as real ones."""
     names = list(gc.samples.plane(2).arrays())
     with tempfile.TemporaryDirectory() as folder:
-        store = MeshStore(Path(folder))
         for i in range(COPIES):
-            (store.folder / f"{i:032x}").mkdir(parents=True)
+            copy = Path(folder, MESHES, f"{i:032x}")
+            copy.mkdir(parents=True)
             for name in names:
-                (store.folder / f"{i:032x}" / f"{name}.npy").touch()
-        return spent(store.sizes) / COPIES
+                (copy / f"{name}.npy").touch()
+        return spent(lambda: list(Folder(Path(folder)).found(MESHES))) / COPIES
 
 
 def _placing(count: int) -> float:

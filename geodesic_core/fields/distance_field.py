@@ -39,12 +39,13 @@ from geodesic_core.fields.sweep_result import (
     stats_of,
 )
 from geodesic_core.fields.sweeps import ExactSweep, MergingSweep, Sweep
+from geodesic_core.fields.transport import transported
 from geodesic_core.kernels.retained.face_windows import FaceWindows
 from geodesic_core.mesh.surface_point import Point, Source, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.reprs import as_table
 from geodesic_core.tolerances import CUT_OFF
-from geodesic_core.validation import check_choice
+from geodesic_core.validation import as_angle, check_choice
 
 
 @dataclass(frozen=True, eq=False)
@@ -445,6 +446,7 @@ class DistanceField:
         >>> field.gradient.round(3).tolist()[1:]
         [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.707, 0.707, 0.0]]
         """
+        self.mesh.require_own_lengths("a gradient")
         winners = self._points.winners.get(Control())
         return gradient_at_vertices(self.mesh, winners, self._sweep.question.nodes)
 
@@ -534,6 +536,7 @@ class DistanceField:
         >>> len(near), near[0].closed, abs(near[0].length - 0.25 * np.pi) < 0.01
         (1, False, True)
         """
+        self.mesh.require_positions("an isoline")
         control = Control(progress, cancel, deadline_s, memory_limit)
         return list(
             self._isolines(as_levels(levels), resolve_chord_error(self.mesh, chord_error), control)
@@ -576,6 +579,7 @@ class DistanceField:
         >>> [len(lines) for lines in field.each_isoline([0.5, 1.2, 9.0])]
         [1, 1, 0]
         """
+        self.mesh.require_positions("an isoline")
         control = Control(progress, cancel, deadline_s, memory_limit)
         return self._isolines(
             as_levels(levels), resolve_chord_error(self.mesh, chord_error), control
@@ -650,15 +654,75 @@ class DistanceField:
         [nan, 0.0, 1.571, 0.785]
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
+        question = self._question_of_one_point("a log map", control)
+        return log_map_of(question, control, x_axis, rescale=rescale)
+
+    def transport(
+        self,
+        angle: float,
+        *,
+        progress: Callable[[float], None] | None = None,
+        cancel: Callable[[], bool] | None = None,
+        deadline_s: float | None = None,
+        memory_limit: int | None = None,
+    ) -> Floats:
+        """Return a vector at the source, carried along the shortest path to each vertex.
+
+        On a straight way a vector keeps its angle with the path. At a vertex, where the angles sum
+        to another total than a full turn, it keeps that in the tangent plane: see `TangentFrames`.
+        So a vector that is carried there and back is the same.
+
+        Parameters
+        ----------
+        angle
+            Radians, in the frame of the source as in `log_map`.
+        progress, cancel, deadline_s, memory_limit
+            See `Control`.
+
+        Returns
+        -------
+        numpy.ndarray
+            (V,) float64, radians, from 0 up to the total angle, in the frame of each vertex: that
+            of `TriangleMesh.tangent_frames`, whose `vectors` makes vectors of them. NaN where
+            unreachable, where several fans of faces meet, and behind bends there.
+
+        Raises
+        ------
+        InvalidArgument
+            The field is not exact, or its source is not one point without a start distance. Or
+            the angle is not a finite number.
+        InvalidPoint
+            The source has no tangent plane.
+        Cancelled, DeadlineExceeded, MemoryLimitExceeded
+            As in `Control`; the field can still be used.
+
+        Notes
+        -----
+        Runs the sweep again, whose windows then carry directions.
+
+        Examples
+        --------
+        >>> field = gc.exact_distance(gc.samples.plane(2), 0)
+        >>> field.transport(np.pi / 4).round(3).tolist()
+        [0.785, 5.498, 2.356, 3.927]
+        """
+        control = Control(progress, cancel, deadline_s, memory_limit)
+        question = self._question_of_one_point("transport", control)
+        return transported(question, as_angle(angle), control)
+
+    def _question_of_one_point(self, name: str, control: Control) -> Question:
+        """Return the question of the field without its targets, for an answer of this name.
+
+        Raises ``InvalidArgument`` where the field is not exact, or its source is not a point.
+        """
         question = self._sweep.question
         if self._sweep.exact is not self._sweep:
-            raise InvalidArgument("only exact fields have a log map: use exact_distance or log_map")
+            raise InvalidArgument(f"only exact fields have {name}: use exact_distance")
         if question.has_curves or question.start_distances.tolist() != [0.0]:
             raise InvalidArgument(
-                "a log map has one source, a point without a start distance: use log_map for each"
+                f"{name} has one source, a point without a start distance: use one field for each"
             )
-        question = Question.of(self.mesh, question.sources, (), question.max_distance, control)
-        return log_map_of(question, control, x_axis, rescale=rescale)
+        return Question.of(self.mesh, question.sources, (), question.max_distance, control)
 
     def borders(
         self,
@@ -713,6 +777,7 @@ class DistanceField:
         [(0, 1), (0, 2), (1, 2)]
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
+        self.mesh.require_positions("a border")
         error, exact = resolve_chord_error(self.mesh, chord_error), self._points.exact.value
         borders: list[Border] = []
         if len(self.sources) > 1:

@@ -125,6 +125,6 @@ def _members_of(path: str | Path) -> dict[str, NDArray[Any]]:
 
 def _digest_of(mesh: TriangleMesh) -> str:
     digest = sha256(f"{len(mesh.vertices)} {len(mesh.faces)} ".encode())
-    for array in (mesh.vertices, mesh.faces):
+    for array in mesh.defining_arrays:
         digest.update(array.data)
     return digest.hexdigest()

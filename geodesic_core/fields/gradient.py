@@ -67,7 +67,7 @@ def _lies_on_curve(mesh: TriangleMesh, winners: Winners, is_parallel: Flags) -> 
     nodes = np.flatnonzero(is_parallel & np.isfinite(distance))
     segments = winners.vertices.winner_ints[nodes, PREDECESSOR]
     away = distance[nodes] - distance[segments]
-    lies[nodes] = away <= ROUNDED_POSITION * mesh.diagonal
+    lies[nodes] = away <= ROUNDED_POSITION * mesh.extent
     return lies
 
 

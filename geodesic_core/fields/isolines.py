@@ -143,7 +143,7 @@ def resolve_chord_error(mesh: TriangleMesh, chord_error: float | None = None) ->
     >>> gc.resolve_chord_error(mesh, 0.1)
     0.1
     """
-    finest = FINEST_CHORD * mesh.diagonal
+    finest = FINEST_CHORD * mesh.extent
     if chord_error is None:
         return max(CHORD_SHARE * float(mesh.topology.geometry[:, LENGTH].mean()), finest)
     if not is_number(chord_error) or not (math.isfinite(chord_error) and chord_error >= finest):

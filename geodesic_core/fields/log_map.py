@@ -208,7 +208,6 @@ def log_map_of(question: Question, control: Control, x_axis: Any, *, rescale: bo
             f"the x axis leads to {question.targets[0]}, which is the source itself, or which no "
             "path leads to: choose another point"
         )
-    is_rescaled = rescale if frame.is_closed else frame.total_angle > turn
     log_map = LogMap(
         mesh=mesh,
         source=source,
@@ -219,7 +218,7 @@ def log_map_of(question: Question, control: Control, x_axis: Any, *, rescale: bo
         _max_distance=question.max_distance,
         _frame=frame,
         _axis=axis,
-        _scale=turn / frame.total_angle if is_rescaled else 1.0,
+        _scale=frame.scale if rescale else 1.0,
     )
     return replace(log_map, angles=log_map._in_range(log_map.angles))
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from geodesic_core import plotting
 from geodesic_core.arrays import Floats, Ints, Longs
-from geodesic_core.errors import InternalError
+from geodesic_core.errors import InternalError, InvalidArgument
 from geodesic_core.fields.path_file import PathRecord, write_path_file
 from geodesic_core.fields.sources import Nodes
 from geodesic_core.kernels.outcome import Outcome
@@ -18,10 +18,13 @@ from geodesic_core.kernels.paths import backtracing, locations
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.paths.locations import Locations
 from geodesic_core.mesh.curve import foot_on
+from geodesic_core.mesh.edge_lengths import flat_points, weights_in_faces
 from geodesic_core.mesh.surface_point import SurfacePoint
+from geodesic_core.mesh.transport import carried_along
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.reprs import as_table
 from geodesic_core.tolerances import PATH_LENGTH, ROUNDED_POSITION
+from geodesic_core.validation import as_angle
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +107,7 @@ class GeodesicPath:
     mesh: TriangleMesh | None
     """The surface, with the barriers of the call; None in a copy or a pickle, which leaves it
     out."""
-    points: Floats
-    """(K, 3) positions, mesh units."""
+    _points: Floats
     faces: Ints
     """(K - 1,) int32: the face between each point and the next."""
     length: float
@@ -116,6 +118,21 @@ class GeodesicPath:
     _location_faces: Ints
     _location_weights: Floats
     _location_vertices: Longs
+
+    @property
+    def points(self) -> Floats:
+        """(K, 3) positions, mesh units.
+
+        Raises
+        ------
+        InvalidArgument
+            The mesh is given by lengths alone: use `locations`.
+        """
+        if np.isnan(self._points[0, 0]):
+            raise InvalidArgument(
+                "the path has no positions in space, as its mesh has lengths alone: use locations"
+            )
+        return self._points
 
     @cached_property
     def locations(self) -> tuple[SurfacePoint, ...]:
@@ -129,6 +146,42 @@ class GeodesicPath:
                 strict=True,
             )
         )
+
+    def transport(self, angle: float) -> float:
+        """Return a vector at the first point, carried along the path to the last one.
+
+        As `DistanceField.transport` does; along any path of a mesh.
+
+        Parameters
+        ----------
+        angle
+            Radians, in the frame of the first point as in `log_map`.
+
+        Returns
+        -------
+        float
+            Radians, in the frame of the last point.
+
+        Raises
+        ------
+        InvalidPoint
+            One of its ends, or a vertex that it passes through, has no tangent plane.
+        InvalidArgument
+            The angle is not a finite number. Or the path is a copy or comes from a pickle, and has
+            no mesh.
+
+        Notes
+        -----
+        O(K).
+
+        Examples
+        --------
+        >>> gc.shortest_path(gc.samples.plane(2), 0, 3).transport(np.pi / 4) == 5 * np.pi / 4
+        True
+        """
+        if self.mesh is None:
+            raise InvalidArgument("a copy of a path has no mesh: use the path that was copied")
+        return carried_along(self.mesh, self.locations, self.faces, as_angle(angle))
 
     def save(self, path: str | Path) -> None:
         """Write the path into a file, in the format that its suffix names.
@@ -216,13 +269,13 @@ class GeodesicPath:
         return self.__dict__ | {"mesh": None}
 
     def __repr__(self) -> str:
-        points = "1 point" if len(self.points) == 1 else f"{len(self.points)} points"
+        points = "1 point" if len(self._points) == 1 else f"{len(self._points)} points"
         return f"GeodesicPath({points}, length {self.length:.6g}, {self.error_bound})"
 
     def _repr_html_(self) -> str:
         ends = {"from": self.locations[0], "to": self.locations[-1], "length": self.length}
         return as_table(
-            "GeodesicPath", ends | {"points": len(self.points), "accuracy": self.error_bound}
+            "GeodesicPath", ends | {"points": len(self._points), "accuracy": self.error_bound}
         )
 
 
@@ -252,9 +305,9 @@ def traced_path(
     located, faces = located_path(mesh, winners, nodes_of_sweep, v)
     return GeodesicPath(
         mesh=mesh,
-        points=located.points + mesh.origin,
+        _points=located.points + mesh.origin,
         faces=faces,
-        length=length_of(located.points),
+        length=length_on(mesh, located, faces),
         error_bound=bound,
         steps=None,
         _location_faces=located.faces,
@@ -279,7 +332,11 @@ def located_path(
         if node < len(mesh.vertices):
             continue
         segment = nodes_of_sweep.segment(node)
-        point = nodes_of_sweep.site(node) if segment is None else foot_on(mesh, segment, points[1])
+        if segment is None:
+            point = nodes_of_sweep.site(node)
+        else:
+            after = point_of(located, 1)
+            point = foot_on(mesh, segment, int(crossed[-1]), after)
         points[i] = mesh.position_from_origin(point)
         faces[i], weights[i] = point.face_index, point.barycentric
         vertices[i] = -1 if point.vertex_index is None else point.vertex_index
@@ -289,9 +346,16 @@ def located_path(
     return located, between[: count - 1]
 
 
+def point_of(located: Locations, i: int) -> SurfacePoint:
+    """Return a point of some locations."""
+    u, v, w = located.weights[i].tolist()
+    vertex = int(located.vertices[i])
+    return SurfacePoint(int(located.faces[i]), (u, v, w), vertex if vertex >= 0 else None)
+
+
 def rounding_of(mesh: TriangleMesh, distance: float) -> float:
     """Return how much the length of a path may differ from a distance by rounding, mesh units."""
-    return PATH_LENGTH * distance + ROUNDED_POSITION * mesh.diagonal
+    return PATH_LENGTH * distance + ROUNDED_POSITION * mesh.extent
 
 
 def length_of(points: Floats) -> float:
@@ -300,11 +364,26 @@ def length_of(points: Floats) -> float:
     return float(np.sqrt((steps * steps).sum(axis=1)).sum())
 
 
+def length_on(mesh: TriangleMesh, located: Locations, faces: Ints) -> float:
+    """Return the length of a polyline on the surface, mesh units; its segments lie in ``faces``."""
+    if mesh.lengths is None:
+        return length_of(located.points)
+    inner = mesh.inner_face[faces].astype(np.int64)
+    start, end = (
+        weights_in_faces(
+            mesh.topology, mesh.faces, located.faces[part], located.weights[part], inner
+        )
+        for part in (slice(None, -1), slice(1, None))
+    )
+    steps = flat_points(mesh.topology, inner, end - start)  # their differences, as it is linear
+    return float(np.hypot(*steps.T).sum())
+
+
 def reversed_path(path: GeodesicPath) -> GeodesicPath:
     """Return the path from its target to its source."""
     return replace(
         path,
-        points=path.points[::-1].copy(),
+        _points=path._points[::-1].copy(),
         faces=path.faces[::-1].copy(),
         _location_faces=path._location_faces[::-1].copy(),
         _location_weights=path._location_weights[::-1].copy(),
@@ -322,7 +401,7 @@ def joined(legs: Sequence[GeodesicPath]) -> GeodesicPath:
     steps = [replace(step, leg=i) for i, leg in enumerate(legs) for step in (leg.steps or ())]
     return GeodesicPath(
         mesh=legs[0].mesh,
-        points=chained("points"),
+        _points=chained("_points"),
         faces=np.concatenate([leg.faces for leg in legs]),
         length=sum(leg.length for leg in legs),
         error_bound=EXACT,

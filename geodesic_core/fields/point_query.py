@@ -34,7 +34,7 @@ from geodesic_core.kernels.front.bounds import exact_bounds, pruning_toward
 from geodesic_core.kernels.mesh.half_edges import point_in_frame
 from geodesic_core.kernels.paths.backtracing import End, Winners
 from geodesic_core.kernels.retained.face_windows import FaceWindows, Reach, reach_point
-from geodesic_core.mesh.curve import weights_by_face
+from geodesic_core.mesh.curve import length_in_face, weights_by_face
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import SEARCH_SLACK, TIE
@@ -222,7 +222,9 @@ def find_nearest_source(
         return NOT_REACHED
     # A vertex beyond the limit of the field is at least as far as that.
     rest = np.minimum(least[: len(mesh.vertices)], limit)
-    pruning_bounds = pruning_toward(mesh.positions, np.zeros(3), upper * (1.0 + SEARCH_SLACK), rest)
+    pruning_bounds = pruning_toward(
+        mesh.bounding_positions, np.zeros(3), upper * (1.0 + SEARCH_SLACK), rest
+    )
     wave = state.new_wavefront(mesh.topology, nodes.sites, pruned=True)
     control.check_memory(state.bytes_of(wave))
     backward = exact_bounds(math.inf, pruning_bounds)
@@ -246,10 +248,9 @@ def _within_face(question: Question, point: SurfacePoint, control: Control) -> f
     mesh = question.mesh
     sources = [line[0] for line in question.polylines]
     starts = question.start_distances
-    position = mesh.position_from_origin(point)
     return min(
         (
-            start + float(np.linalg.norm(mesh.position_from_origin(source) - position))
+            start + length_in_face(mesh, source, point)
             for source, start in control.watched(zip(sources, starts.tolist(), strict=True))
             if source.face_index == point.face_index
         ),

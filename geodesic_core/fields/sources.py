@@ -13,6 +13,7 @@ from geodesic_core.control import Control
 from geodesic_core.errors import BlockedSource, InvalidArgument, InvalidPoint, NoPath
 from geodesic_core.fields.vertex_points import VertexPoints
 from geodesic_core.kernels.front.state import NO_SITES, NODE, SEGMENT, SEGMENT_ENDS, SITE, Sites
+from geodesic_core.kernels.mesh.half_edges import TAIL
 from geodesic_core.mesh.barriers import walled_in
 from geodesic_core.mesh.canonical import half_edges_around, remedy
 from geodesic_core.mesh.curve import (
@@ -22,6 +23,7 @@ from geodesic_core.mesh.curve import (
     segments_of,
     weights_by_face,
 )
+from geodesic_core.mesh.edge_lengths import flat_points
 from geodesic_core.mesh.surface_point import UNPLACED, Curve, Point, Points, Source, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.validation import is_number, unboxed
@@ -364,5 +366,15 @@ def corners_of(mesh: TriangleMesh, point: SurfacePoint) -> tuple[Ints, Floats]:
     if point.vertex_index is not None:
         return inner[[point.vertex_index]], np.zeros(1)
     corners = inner[mesh.faces[point.face_index]]
+    if mesh.lengths is not None:
+        return _corners_laid_flat(mesh, point)
     away = mesh.positions[corners] - mesh.position_from_origin(point)
     return corners, np.linalg.norm(away, axis=1)
+
+
+def _corners_laid_flat(mesh: TriangleMesh, point: SurfacePoint) -> tuple[Ints, Floats]:
+    """Return the same of a point in a face, whose corners have no positions with its lengths."""
+    face = int(mesh.inner_face[point.face_index])
+    corners = mesh.topology.links[3 * face : 3 * face + 3, TAIL]
+    weights = np.array(weights_by_face(mesh, point)[face])
+    return corners, np.hypot(*flat_points(mesh.topology, np.full(3, face), weights - np.eye(3)).T)

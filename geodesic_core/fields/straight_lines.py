@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from geodesic_core.arrays import Floats, Longs
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument, InvalidPoint
-from geodesic_core.fields.path import EXACT, GeodesicPath
+from geodesic_core.fields.path import EXACT, GeodesicPath, point_of
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
     COS_LEFT,
@@ -91,7 +91,7 @@ class StraightLine(GeodesicPath):
     no tangent plane"""
 
     def __repr__(self) -> str:
-        points = "1 point" if len(self.points) == 1 else f"{len(self.points)} points"
+        points = "1 point" if len(self._points) == 1 else f"{len(self._points)} points"
         return f"StraightLine({points}, length {self.length:.6g}, stopped by {self.stopped})"
 
 
@@ -250,7 +250,7 @@ def _as_paths(
     _fill(all_rows, first[:-1], _rows_of(mesh, starts))
     _fill(all_rows, first[1:][inside] - 1, ends)
     on_edges = first[1:][(ints[:, STOP] != AT_LENGTH) & (ints[:, VERTEX] < 0)] - 1
-    canonical = [mesh.point(_point_of(all_rows, row)) for row in on_edges]
+    canonical = [mesh.point(point_of(all_rows, row)) for row in on_edges]
     _fill(all_rows, on_edges, _rows_of(mesh, canonical))
     faces = np.empty(len(is_passed), np.int32)
     faces[is_passed] = mesh.topology.outer_face[trail.faces]
@@ -259,14 +259,14 @@ def _as_paths(
     directions[inside] = _directions_in_faces(mesh, ints[inside, HALF_EDGE], floats[inside])
     lines = []
     for i, (lo, hi) in enumerate(pairwise(first.tolist())):
-        end = _point_of(all_rows, hi - 1)
+        end = point_of(all_rows, hi - 1)
         stop = int(ints[i, STOP])
         if stop != AT_LENGTH or 0.0 in end.barycentric:
             directions[i] = _direction_on_edge(mesh, end, ints[i], floats[i])
         lines.append(
             StraightLine(
                 mesh=mesh,
-                points=points[lo:hi],
+                _points=points[lo:hi],
                 faces=faces[lo + 1 : hi],
                 length=float(lengths[i] - (0.0 if stop == AT_LENGTH else floats[i, LEFT])),
                 error_bound=EXACT,
@@ -338,12 +338,6 @@ def _ends_in_faces(mesh: TriangleMesh, h: Longs, x: Floats, y: Floats) -> Locati
     ]
     _fill(located, beside, _rows_of(mesh, points))
     return located
-
-
-def _point_of(located: Locations, i: int) -> SurfacePoint:
-    u, v, w = located.weights[i].tolist()
-    vertex = int(located.vertices[i])
-    return SurfacePoint(int(located.faces[i]), (u, v, w), vertex if vertex >= 0 else None)
 
 
 def _word(mesh: TriangleMesh, stop: int, end: SurfacePoint) -> Stopped:

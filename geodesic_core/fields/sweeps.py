@@ -186,12 +186,16 @@ class ExactSweep(WholeSweep):
         return exact_bounds(self.question.max_distance)
 
 
+@dataclass(frozen=True, eq=False)
 class DirectedSweep(ExactSweep):
     """The exact sweep whose windows carry the directions in which paths leave their source."""
 
+    from_bends: bool = False
+    """Whether those of paths that leave a bend are carried from there as well"""
+
     def _bounds(self) -> Bounds:
         is_mirrored = bool((self.question.mesh.topology.flags & SEAM).any())
-        return with_directions(super()._bounds(), is_mirrored)
+        return with_directions(super()._bounds(), is_mirrored, self.from_bends)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,7 @@
 
 import base64
 import math
+import re
 import zlib
 from collections.abc import Mapping
 from io import BytesIO
@@ -28,6 +29,8 @@ _HUNDREDTHS = 0.01
 """Unit of the integers that older quadrangle files have for positions, mm"""
 _BASE64_GZIP, _MOST_BYTES_OF_VALUE = 3, 16
 """Of GIFTI: the number of an encoding, and bytes of the largest type"""
+_VALUE = re.compile(r"(?:^|\r)[^\S\r\n]*[^\s#]", re.MULTILINE)
+"""The first value of an array's text, in which numpy takes ``#`` for the start of a comment"""
 _POINTS, _TRIANGLES = "NIFTI_INTENT_POINTSET", "NIFTI_INTENT_TRIANGLE"
 
 
@@ -59,9 +62,9 @@ def _bounded_parser(base: Any, size: int, max_faces: int | None) -> Any:
             )
 
         def flush_chardata(self) -> None:
-            if self.write_to == "Data" and self._char_blocks:
-                text = "".join(self._char_blocks)
-                if not text.strip():
+            if self.write_to == "Data":
+                text = "".join(self._char_blocks or ())
+                if not _VALUE.search(text):
                     raise InvalidMesh("an array of the GIFTI file is empty")
                 if self.da.encoding == _BASE64_GZIP:
                     _check_unpacked(text, math.prod(self.da.dims))

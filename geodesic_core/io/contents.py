@@ -30,6 +30,9 @@ class FileContents(NamedTuple):
     """How much the file holds that is no part of the surface, by name"""
     notes: tuple[str, ...] = ()
     """Sentences on how the file was read"""
+    lengths: NDArray[Any] | None = None
+    """(P, 3) of a file of triangles that gives the lengths of their edges; its vertices may be NaN
+    then"""
 
     @classmethod
     def of_triangles(

@@ -13,6 +13,7 @@ import numpy as np
 
 from geodesic_core.control import Control
 from geodesic_core.errors import (
+    InvalidArgument,
     InvalidMesh,
     MissingExtra,
     TooManyFaces,
@@ -24,6 +25,7 @@ from geodesic_core.io.contents import FileContents
 from geodesic_core.io.glb import read_glb, read_gltf
 from geodesic_core.io.grid import read_grid
 from geodesic_core.io.limits import check_face_count
+from geodesic_core.io.npz import read_npz
 from geodesic_core.io.obj import read_obj
 from geodesic_core.io.off import read_off
 from geodesic_core.io.ply import read_ply
@@ -48,6 +50,7 @@ _READERS: dict[str, _Reader] = {
     "freesurfer": read_freesurfer,
     **dict.fromkeys(("vtk", "vtp", "vtu", "vts", "vtr", "vti"), read_vtk),
     "asc": read_grid,
+    "npz": read_npz,
 }
 _AMBIGUOUS = ("asc",)
 """Suffixes that several types of files have"""
@@ -63,7 +66,7 @@ def load_mesh(
     max_bytes: int | None = None,
     cancel: Callable[[], bool] | None = None,
 ) -> TriangleMesh:
-    r"""Read a mesh file: OBJ, OFF, PLY, STL, GLB, GIFTI, FreeSurfer, VTK or an Esri ASCII grid.
+    r"""Read a mesh file: OBJ, OFF, PLY, STL, GLB, GIFTI, FreeSurfer, VTK, Esri ASCII grid or NPZ.
 
     Vertices keep the file's numbering and faces its order. Polygons become triangles, in place, and
     ``mesh.face_map`` leads from these to the polygon. Lines, points and curves are left out, and
@@ -73,7 +76,8 @@ def load_mesh(
     its meshes; those that share their positions share vertices. Skins stand as their joints do at
     rest, and morph targets count by their default weights. An STL file has no numbering: its equal
     corners are always merged, in order of first appearance, and
-    ``mesh.vertex_map[3 * face + corner]`` is the vertex.
+    ``mesh.vertex_map[3 * face + corner]`` is the vertex. An NPZ file holds the arrays of
+    `TriangleMesh.from_lengths`: ``faces``, ``lengths`` and, where it is to be drawn, ``vertices``.
 
     Parameters
     ----------
@@ -82,9 +86,9 @@ def load_mesh(
         a zip archive that holds one mesh.
     file_type
         ``"obj"``, ``"off"``, ``"ply"``, ``"stl"``, ``"glb"``, ``"gltf"``, ``"gii"``,
-        ``"freesurfer"``, ``"vtk"`` (or ``"vtp"``, ``"vtu"``, ``"vts"``, ``"vtr"``, ``"vti"``) or
-        ``"asc"``; by default the suffix of the name. Without a known suffix, as FreeSurfer's
-        ``lh.pial``, the first bytes decide where they can.
+        ``"freesurfer"``, ``"vtk"`` (or ``"vtp"``, ``"vtu"``, ``"vts"``, ``"vtr"``, ``"vti"``),
+        ``"asc"`` or ``"npz"``; by default the suffix of the name. Without a known suffix, as
+        FreeSurfer's ``lh.pial``, the first bytes decide where they can.
     merge
         ``"exact"`` merges vertices at equal positions, a distance those within it, as
         `TriangleMesh` does.
@@ -118,7 +122,7 @@ def load_mesh(
         The file cannot be read, is not of this type, is damaged, declares more than it holds, or
         holds a mesh that `TriangleMesh` refuses.
     InvalidArgument
-        ``merge`` is no way of merging.
+        ``merge`` is no way of merging, or the file gives lengths, and vertices cannot be merged.
     Cancelled
         ``cancel`` returned true.
     MissingExtra
@@ -156,6 +160,11 @@ def load_mesh(
     if left_out := read.left_out_in_words():
         what = f"The {kind.upper()} file also holds {left_out}"
         notes += (f"{what}, which are not part of the surface and were left out.",)
+    if read.lengths is not None:
+        if merge != "none":
+            raise InvalidArgument("merge must be 'none' for a surface that is given by its lengths")
+        positions = None if np.isnan(read.vertices).all() else read.vertices
+        return TriangleMesh.from_lengths(read.corners.reshape(-1, 3), read.lengths, positions)
     return TriangleMesh.from_polygons(read.vertices, read.corners, read.sizes, merge, notes)
 
 

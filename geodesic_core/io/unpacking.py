@@ -72,8 +72,8 @@ def read_unpacked(
 ) -> NamedBytes:
     """Return a file's content, unpacked if it comes from zip, gzip, bzip2 or xz.
 
-    A zip archive must hold one file of the ``suffixes``. Text in UTF-16 or UTF-32 becomes UTF-8,
-    and no text begins with a byte order mark.
+    A zip archive must hold one file of the ``suffixes``, or NumPy's arrays, which stay in it. Text
+    in UTF-16 or UTF-32 becomes UTF-8, and no text begins with a byte order mark.
 
     Raises
     ------
@@ -127,6 +127,11 @@ def _only_member(
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             names = [name for name in archive.namelist() if _is_content(name)]
+            if names and all(name.endswith(".npy") for name in names):
+                unpacked = sum(entry.file_size for entry in archive.infolist())
+                if max_bytes is not None and unpacked > max_bytes:
+                    raise FileTooLarge(max_bytes)
+                return NamedBytes("arrays.npz", data)
             chosen = [name for name in names if NamedBytes(name, b"").suffix in suffixes]
             if len(chosen) != 1:
                 held = ", ".join((chosen or names)[:5]) or "nothing"

@@ -178,7 +178,7 @@ def write_matrix(
         "fast": {"effort": effort},
     }
     facts = {
-        "mesh": _digest(mesh.vertices, mesh.faces, mesh.barriers),
+        "mesh": _digest(*mesh.defining_arrays, mesh.barriers),
         "barriers": mesh.barriers.tolist(),
         "sources": rows,
         "targets": columns,

@@ -100,7 +100,9 @@ class Plan:
 
 
 def _positions(mesh: TriangleMesh, points: Sequence[SurfacePoint]) -> Floats:
-    """Return the positions of canonical points, (n, 3)."""
+    """Return the positions of canonical points, (n, 3); zeros where they have none."""
+    if not mesh.has_positions:
+        return np.zeros((len(points), 3))
     if isinstance(points, VertexPoints):
         return mesh.vertices[points.vertices]
     return np.array([mesh.position(point) for point in points])

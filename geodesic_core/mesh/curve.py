@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from geodesic_core.arrays import Floats
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument, InvalidPoint
 from geodesic_core.kernels.mesh.half_edges import APEX, TAIL
 from geodesic_core.mesh.canonical import half_edges_around
+from geodesic_core.mesh.edge_lengths import flat_points
 from geodesic_core.mesh.surface_point import Curve, Point, SurfacePoint, Weights
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
@@ -110,7 +110,8 @@ def segments_of(mesh: TriangleMesh, polyline: Iterable[SurfacePoint]) -> list[li
     segments = []
     for start, end in pairwise(polyline):
         places = mesh.position_from_origin(start), mesh.position_from_origin(end)
-        if not np.array_equal(*places):
+        is_long = start != end if mesh.lengths is not None else not np.array_equal(*places)
+        if is_long:
             at_start, at_end = weights_by_face(mesh, start), weights_by_face(mesh, end)
             shared = [face for face in at_start if face in at_end]
             segments.append([SegmentInFace(face, at_start[face], at_end[face]) for face in shared])
@@ -138,21 +139,38 @@ def weights_by_face(mesh: TriangleMesh, point: SurfacePoint) -> dict[int, Weight
     return {g // 3: weights_in(g // 3) for g in half_edges_around(topology.links, h)}
 
 
-def foot_on(mesh: TriangleMesh, segment: SegmentInFace, position: Floats) -> SurfacePoint:
-    """Return the canonical point of a segment that is nearest to a position, from the origin."""
-    inner = mesh.topology.links[3 * segment.face : 3 * segment.face + 3, TAIL]
+def length_in_face(mesh: TriangleMesh, start: SurfacePoint, end: SurfacePoint) -> float:
+    """Return the distance of two canonical points in one face, within it, mesh units."""
+    if mesh.lengths is None:
+        return float(
+            np.linalg.norm(mesh.position_from_origin(start) - mesh.position_from_origin(end))
+        )
+    face = int(mesh.inner_face[start.face_index])
+    apart = np.array(weights_by_face(mesh, start)[face]) - weights_by_face(mesh, end)[face]
+    return float(np.hypot(*flat_points(mesh.topology, np.array([face]), apart[None])[0]))
+
+
+def foot_on(
+    mesh: TriangleMesh, segment: SegmentInFace, inner_face: int, point: SurfacePoint
+) -> SurfacePoint:
+    """Return the canonical point of a segment that is nearest to a point of an inner face.
+
+    The segment lies in that face as well.
+    """
+    topology = mesh.topology
+    corners = topology.links[3 * inner_face : 3 * inner_face + 3, TAIL].tolist()
+    own = topology.links[3 * segment.face : 3 * segment.face + 3, TAIL].tolist()
     start, end = (
-        (np.array(weights)[:, None] * mesh.positions[inner]).sum(axis=0)
+        np.array([dict(zip(own, weights, strict=True)).get(v, 0.0) for v in corners])
         for weights in (segment.start, segment.end)
     )
-    along = end - start
-    t = min(max(float((position - start) @ along / (along @ along)), 0.0), 1.0)
-    share = {
-        v: (1.0 - t) * at_start + t * at_end
-        for v, at_start, at_end in zip(inner.tolist(), segment.start, segment.end, strict=True)
-    }
-    face = int(mesh.topology.outer_face[segment.face])
-    u, v, w = (share[v] for v in mesh.topology.inner_vertex[mesh.faces[face]].tolist())
+    weights = np.stack([start, end, weights_by_face(mesh, point)[inner_face]])
+    first, last, place = flat_points(topology, np.full(3, inner_face), weights)
+    along = last - first
+    t = min(max(float((place - first) @ along / (along @ along)), 0.0), 1.0)
+    share = dict(zip(corners, ((1.0 - t) * start + t * end).tolist(), strict=True))
+    face = int(topology.outer_face[inner_face])
+    u, v, w = (share[v] for v in topology.inner_vertex[mesh.faces[face]].tolist())
     return mesh.point(SurfacePoint.face(face, (u, v, w)))
 
 

@@ -13,7 +13,6 @@ import numpy as np
 from geodesic_core.arrays import Floats
 from geodesic_core.errors import InvalidPoint
 from geodesic_core.kernels.mesh.half_edges import (
-    APEX_ANGLE,
     BOUNDARY,
     COS_LEFT,
     COS_RIGHT,
@@ -27,6 +26,7 @@ from geodesic_core.kernels.mesh.half_edges import (
 from geodesic_core.mesh.curve import weights_by_face
 from geodesic_core.mesh.surface_point import SurfacePoint, Weights
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.mesh.vertex_frames import vertex_frames
 from geodesic_core.tolerances import NO_DIRECTION
 
 
@@ -43,6 +43,12 @@ class Frame:
     is_closed: bool
     """Whether the surface closes around the point: then angles are from 0 up to the total angle"""
 
+    @property
+    def scale(self) -> float:
+        """Angle in the tangent plane for one of the surface, see `TangentFrames`."""
+        turn = 2.0 * math.pi
+        return turn / self.total_angle if self.is_closed or self.total_angle > turn else 1.0
+
     def angles(self, kernel_angles: Floats) -> Floats:
         """Return angles from the kernels' own."""
         angles = self.sense * (kernel_angles - self.start)
@@ -52,6 +58,14 @@ class Frame:
         """Return the kernels' angles, the inverse of `angles`."""
         kernel_angles = self.start + self.sense * angles
         return np.mod(kernel_angles, self.total_angle) if self.is_closed else kernel_angles
+
+    def turn_of(self, angle: float) -> float:
+        """Return an angle in the tangent plane, in the kernels' sense and from their beginning."""
+        return self.scale * (self.start + self.sense * angle)
+
+    def angle_of(self, turn: float) -> float:
+        """Return the angle of a turn in the tangent plane, the inverse of `turn_of`."""
+        return self.sense * (turn - self.scale * self.start) % (2.0 * math.pi) / self.scale
 
 
 def frame_at(mesh: TriangleMesh, point: SurfacePoint) -> Frame:
@@ -66,19 +80,13 @@ def frame_at(mesh: TriangleMesh, point: SurfacePoint) -> Frame:
 
 def _at_vertex(mesh: TriangleMesh, point: SurfacePoint) -> Frame:
     topology = mesh.topology
-    v, total = topology.inner_vertex[point.vertex_index], 0.0
-    total = float(topology.total_angle[v])
-    inner = int(mesh.inner_face[point.face_index])
-    (h,) = (h for h in _half_edges_of(inner) if topology.links[h, TAIL] == v)
-    is_turned_over = _is_turned_over(mesh, point.face_index)
+    v = topology.inner_vertex[point.vertex_index]
     if topology.flags[v] & FANS:
         raise _without_plane(point, "several fans of faces meet")
-    if topology.flags[v] & BOUNDARY:
-        return _open_frame(total, is_turned_over)
-    start = float(topology.geometry[following(h), APEX_ANGLE])
-    if not is_turned_over:
-        return Frame(start, 1, total, True)
-    return Frame(start + _angle(mesh, h, COS_LEFT, SIN_LEFT), -1, total, True)
+    nodes, lowest = np.array([v]), np.array([point.face_index])
+    frames = vertex_frames(topology, mesh.faces, mesh.inner_face, nodes, lowest)
+    is_closed, total = not topology.flags[v] & BOUNDARY, float(topology.total_angle[v])
+    return Frame(float(frames.starts[0]), int(frames.senses[0]), total, is_closed)
 
 
 def _beside(mesh: TriangleMesh, point: SurfacePoint) -> Frame:
@@ -88,7 +96,8 @@ def _beside(mesh: TriangleMesh, point: SurfacePoint) -> Frame:
     if len(faces) > 2:
         raise _without_plane(point, f"{len(faces)} faces meet at an edge")
     if len(faces) == 1 and 0.0 in point.barycentric:
-        return _open_frame(math.pi, is_turned_over)
+        start, sense = (math.pi, -1) if is_turned_over else (0.0, 1)
+        return Frame(start, sense, math.pi, False)
     inner = int(mesh.inner_face[point.face_index])
     base, turn = base_of(inner, faces[inner]), list(faces).index(inner) * math.pi
     first, second = mesh.topology.inner_vertex[mesh.faces[point.face_index, :2]].tolist()
@@ -109,10 +118,6 @@ def _without_plane(point: SurfacePoint, why: str) -> InvalidPoint:
     )
 
 
-def _open_frame(total: float, is_turned_over: bool) -> Frame:
-    return Frame(total, -1, total, False) if is_turned_over else Frame(0.0, 1, total, False)
-
-
 def axis_of(mesh: TriangleMesh, h: int, base: int) -> float:
     """Return the direction of a half-edge in the frame of another one of its face, radians."""
     if h == base:
@@ -125,8 +130,10 @@ def axis_of(mesh: TriangleMesh, h: int, base: int) -> float:
 def direction_of(mesh: TriangleMesh, point: SurfacePoint, vector: Floats) -> float:
     """Return the direction of a vector in space, projected to the surface at a canonical point.
 
-    Radians in the frame of the point; NaN where its projection has no direction.
+    Radians in the frame of the point; NaN where its projection has no direction. Raises
+    `InvalidArgument` where the surface is given by its lengths.
     """
+    mesh.require_own_lengths("a direction")
     if point.vertex_index is not None:
         frames, v = mesh.tangent_frames(), point.vertex_index
         x_axis, y_axis, scale = frames.x_axes[v], frames.y_axes[v], float(frames.scales[v])

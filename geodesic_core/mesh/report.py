@@ -13,10 +13,14 @@ from geodesic_core.kernels.mesh.build import count_boundary_loops
 from geodesic_core.kernels.mesh.half_edges import (
     BOUNDARY,
     FANS,
+    HEAD,
+    LENGTH,
     SADDLE,
     SEAM,
     SIN_LEFT,
+    TAIL,
     Embedding,
+    Topology,
 )
 from geodesic_core.mesh.degeneracies import (
     edges_of_no_length,
@@ -24,7 +28,7 @@ from geodesic_core.mesh.degeneracies import (
     of_three_vertices,
     repeated_rows,
 )
-from geodesic_core.mesh.seams import seams_of
+from geodesic_core.mesh.seams import NO_SEAMS, seams_of
 
 NAMED = 10
 """Ids named in a message or a report, at most."""
@@ -165,9 +169,17 @@ def edges_of(faces: Ints) -> tuple[Ints, Ints, NDArray[np.bool_]]:
 
 
 def report_of(
-    vertices: Floats, faces: Ints, face_map: Longs | None, embedding: Embedding
+    vertices: Floats,
+    faces: Ints,
+    face_map: Longs | None,
+    embedding: Embedding,
+    *,
+    by_lengths: bool,
 ) -> MeshReport:
-    """Return the report of a mesh; O(V log V + F log F)."""
+    """Return the report of a mesh; O(V log V + F log F).
+
+    Where it is given ``by_lengths``, positions tell nothing of what is joined.
+    """
     topology = embedding.topology
     inner = topology.inner_vertex
     lowest_joined = topology.outer_vertex[inner]
@@ -182,9 +194,8 @@ def report_of(
     is_collapsed = of_three_vertices(faces[outside]) & ~of_three_vertices(inner[faces[outside]])
     collapsed = outside[is_collapsed]
     edges, edge_faces, same_way = edges_of(corners)
-    lengths = np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1)
-    first_used = used[first_equal(vertices[used])]
-    seams = seams_of(embedding, used, first_used)
+    first_used = used if by_lengths else used[first_equal(vertices[used])]
+    seams = NO_SEAMS if by_lengths else seams_of(embedding, used, first_used)
     lowest = used[np.unique(topology.component[used], return_index=True)[1]]
     polygons = np.zeros(0) if face_map is None else np.bincount(face_map)
     return MeshReport(
@@ -214,8 +225,14 @@ def report_of(
         inconsistent_orientation=bool(same_way.any()),
         misoriented_edges=Sample.of(edges[same_way]),
         bounds=(tuple(vertices.min(axis=0).tolist()), tuple(vertices.max(axis=0).tolist())),
-        mean_edge_length=float(lengths.mean()),
+        mean_edge_length=_mean_edge_length(topology),
     )
+
+
+def _mean_edge_length(topology: Topology) -> float:
+    ends = np.sort(topology.links[:, [TAIL, HEAD]], axis=1).astype(np.int64)
+    _, first = np.unique(ends[:, 0] << 32 | ends[:, 1], return_index=True)
+    return float(topology.geometry[first, LENGTH].mean())
 
 
 def warnings_of(report: MeshReport) -> Iterator[str]:

@@ -35,6 +35,10 @@ class Seams(NamedTuple):
     """(J, 2): the edge of each, the lower vertex first"""
 
 
+_NONE = np.empty((0, 2), np.int64)
+NO_SEAMS = Seams(_NONE, np.empty(0), _NONE[:, 0], _NONE)
+
+
 def seams_of(embedding: Embedding, used: Longs, first: Longs) -> Seams:
     """Return the open seams of a mesh; O(B log B) for B border vertices in practice.
 
@@ -45,8 +49,7 @@ def seams_of(embedding: Embedding, used: Longs, first: Longs) -> Seams:
     links = topology.links
     border = np.flatnonzero(links[:, OPPOSITE] == NO_FACE)
     if len(border) == 0:
-        none = np.empty((0, 2), np.int64)
-        return Seams(none, np.empty(0), none[:, 0], none)
+        return NO_SEAMS
     ends = np.stack([links[border, TAIL], links[border, HEAD]], axis=1)
     outer_ends: Longs = topology.outer_vertex[ends].astype(np.int64)
 

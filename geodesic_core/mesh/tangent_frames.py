@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from geodesic_core.arrays import Flags, Floats, Ints
 from geodesic_core.errors import InvalidArgument
-from geodesic_core.kernels.mesh.half_edges import APEX, BOUNDARY, FANS, HEAD, Topology
+from geodesic_core.kernels.mesh.half_edges import APEX, HEAD, Topology
+from geodesic_core.mesh.vertex_frames import first_corners, is_open, scales_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,15 +117,13 @@ def tangent_frames_of(
     used = np.flatnonzero(inner_face >= 0)
     nodes = topology.inner_vertex[faces[used]]  # what edges of no length join is one
     places, flat = vertices[topology.outer_vertex], nodes.reshape(-1)
-    first = np.full(len(vertices), -1)
-    first[flat[::-1]] = np.arange(len(flat))[::-1]  # the first corner at each
+    first = first_corners(nodes, len(vertices))
     ahead = np.arange(len(vertices))
     is_used = first >= 0
     corner = first[is_used]
     ahead[is_used] = flat[corner - corner % 3 + (corner + 1) % 3]
-    is_open = (topology.flags & (BOUNDARY | FANS)) != 0
     is_turned_over = _turned_over(nodes, inner_face[used], topology)
-    for v in np.flatnonzero(is_open & is_used).tolist():
+    for v in np.flatnonzero(is_open(topology) & is_used).tolist():
         begin, end = topology.first_corner[v], topology.first_corner[v + 1]
         at, column = (end - 1, APEX) if is_turned_over[first[v] // 3] else (begin, HEAD)
         ahead[v] = topology.links[topology.corners[at], column]
@@ -135,11 +134,8 @@ def tangent_frames_of(
     normals = _unit(_normals(places, one_sided) * sides[:, None])
     x_axes = places[ahead] - places
     x_axes = _unit(x_axes - np.einsum("vk,vk->v", x_axes, normals)[:, None] * normals)
-    total = topology.total_angle
-    is_scaled = np.where(is_open, total > 2.0 * math.pi, total > 0.0)
-    scales = np.divide(2.0 * math.pi, total, out=np.ones_like(total), where=is_scaled)
     y_axes = np.cross(normals, x_axes)
-    by_node = normals, x_axes, y_axes, total, scales
+    by_node = normals, x_axes, y_axes, topology.total_angle, scales_of(topology)
     return TangentFrames(*(array[topology.inner_vertex] for array in by_node))
 
 

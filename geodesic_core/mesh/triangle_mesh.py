@@ -12,7 +12,14 @@ from geodesic_core import plotting
 from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.errors import InvalidArgument, InvalidMesh, InvalidPoint
 from geodesic_core.kernels.mesh import build
-from geodesic_core.kernels.mesh.half_edges import TAIL, Embedding, Topology
+from geodesic_core.kernels.mesh.half_edges import (
+    LENGTH,
+    LENGTH_LEFT,
+    SIN_LEFT,
+    TAIL,
+    Embedding,
+    Topology,
+)
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.mesh import canonical
 from geodesic_core.mesh.closest_point import NearestFace
@@ -22,6 +29,7 @@ from geodesic_core.mesh.degeneracies import (
     merged,
     of_three_vertices,
 )
+from geodesic_core.mesh.edge_lengths import as_edge_lengths
 from geodesic_core.mesh.report import NAMED, MeshReport, report_of, warnings_of
 from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.tangent_frames import TangentFrames, tangent_frames_of
@@ -100,6 +108,9 @@ class TriangleMesh:
     """(given vertices,) int64: the vertex that each given one became; None where none moved."""
     face_map: Longs | None
     """(F,) int64: the polygon that each face came from; None where each polygon is one face."""
+    lengths: Floats | None
+    """(F, 3) float64, read-only, mesh units: the lengths of edges that the mesh was given, from
+    corner i to corner i + 1; None where they are the distances of its vertices."""
     embedding: Embedding
     """Half-edges and positions, see `geodesic_core.kernels.mesh.half_edges`."""
     _notes: tuple[str, ...]
@@ -160,6 +171,109 @@ class TriangleMesh:
         mesh._build(points, faces, face_map, merge, notes)
         return mesh
 
+    @classmethod
+    def from_lengths(
+        cls, faces: ArrayLike, lengths: ArrayLike, vertices: ArrayLike | None = None
+    ) -> "TriangleMesh":
+        """Return the surface whose edges have these lengths, wherever it lies, if it lies anywhere.
+
+        Distances, paths, log maps, lines and all else on the surface need no more: a flat torus, a
+        cone, an averaged cortex. What needs space, such as `locate` and pictures, needs
+        ``vertices`` as well. Two faces share an edge where they share two vertices: so two edges
+        between the same vertices, as on a torus two cells wide, cannot be given.
+
+        Parameters
+        ----------
+        faces
+            (F, 3) vertex indices, integers; as for `TriangleMesh`.
+        lengths
+            (F, 3) mesh units: number i of a face is that of its edge from corner i to corner i + 1.
+        vertices
+            (V, 3) positions to draw the surface at, which need not have these lengths. None for
+            none: then vertices are numbered up to the highest that a face has.
+
+        Returns
+        -------
+        TriangleMesh
+            Without ``vertices`` its own are NaN.
+
+        Raises
+        ------
+        InvalidMesh
+            Naming the elements at fault: as for `TriangleMesh`; a length that is NaN, infinite or
+            shorter than 1e-50; a face with one side longer than the other two; an edge on whose
+            length two faces disagree.
+
+        Notes
+        -----
+        O(V + F). A face whose sides add up to the third has no area, and is treated as such faces
+        are anywhere. Lengths may be off by 1e-9 of themselves.
+
+        Examples
+        --------
+        >>> tetrahedron = [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]
+        >>> mesh = gc.TriangleMesh.from_lengths(tetrahedron, np.ones((4, 3)))
+        >>> gc.exact_distance(mesh, 0).distances.tolist()
+        [0.0, 1.0, 1.0, 1.0]
+        """
+        triangles = as_faces(faces)
+        points = None if vertices is None else as_vertices(vertices)
+        count = int(triangles.max()) + 1 if points is None else len(points)
+        if points is not None:
+            check_vertices(points)
+        check_corners(triangles.reshape(-1), np.full(len(triangles), 3), count)
+        own = as_edge_lengths(lengths, triangles)
+        if points is None:
+            points = np.full((count, 3), np.nan)
+        mesh = cls.__new__(cls)
+        everywhere = np.arange(len(triangles))
+        outer = triangles.astype(np.int32)
+        mesh._hold(points, outer, None, None, _prepared(points, outer, everywhere, own), (), own)
+        return mesh
+
+    def with_lengths(self, lengths: ArrayLike) -> "TriangleMesh":
+        """Return this mesh with other lengths of its edges, and the same vertices to draw it at.
+
+        Parameters
+        ----------
+        lengths
+            (F, 3) mesh units, as for `from_lengths`.
+
+        Returns
+        -------
+        TriangleMesh
+            With the same faces blocked; vertices keep their numbers, also those at one position.
+
+        Raises
+        ------
+        InvalidMesh
+            As for `from_lengths`.
+
+        Examples
+        --------
+        >>> mesh = gc.samples.plane(2)
+        >>> wide = mesh.with_lengths([[2.0, 1.0, 5**0.5], [5**0.5, 2.0, 1.0]])
+        >>> gc.exact_distance(wide, 0).distances.round(3).tolist()
+        [0.0, 2.0, 1.0, 2.236]
+        """
+        own = as_edge_lengths(lengths, self.faces.astype(np.int64))
+        return self._among(np.setdiff1d(np.arange(len(self.faces)), self.barriers), own)
+
+    def _among(self, free: Longs, lengths: Floats | None) -> "TriangleMesh":
+        """Return this mesh with these faces free and all others blocked, and these lengths."""
+        mesh = TriangleMesh.__new__(TriangleMesh)
+        embedding = _prepared(self.vertices - self.origin, self.faces, free, lengths)
+        mesh._hold(
+            self.vertices,
+            self.faces,
+            self.vertex_map,
+            self.face_map,
+            embedding,
+            self._notes,
+            lengths,
+        )
+        return mesh
+
     def _build(
         self,
         points: Floats,
@@ -177,7 +291,8 @@ class TriangleMesh:
             points, vertex_map = merged(points, _merging_distance(merge))
             triangles = vertex_map[triangles]
         faces = triangles.astype(np.int32)
-        embedding = _prepare(points - build.origin_of(points, faces), faces, np.arange(len(faces)))
+        everywhere = np.arange(len(faces))
+        embedding = _prepared(points - build.origin_of(points, faces), faces, everywhere, None)
         self._hold(points, faces, vertex_map, face_map, embedding, notes)
 
     def _hold(
@@ -188,12 +303,14 @@ class TriangleMesh:
         face_map: Longs | None,
         embedding: Embedding,
         notes: Sequence[str] = (),
+        lengths: Floats | None = None,
     ) -> None:
         self.__dict__.update(
             vertices=_frozen(vertices),
             faces=_frozen(faces),
             vertex_map=None if vertex_map is None else _frozen(vertex_map),
             face_map=None if face_map is None else _frozen(face_map),
+            lengths=None if lengths is None else _frozen(lengths),
             embedding=_frozen_embedding(embedding),
             _notes=tuple(notes),
         )
@@ -235,6 +352,8 @@ class TriangleMesh:
             Embedding(
                 Topology(**{name: arrays[name] for name in Topology._fields}), arrays["positions"]
             ),
+            (),
+            arrays.get("lengths"),
         )
         return mesh
 
@@ -259,6 +378,8 @@ class TriangleMesh:
             arrays["vertex_map"] = self.vertex_map
         if self.face_map is not None:
             arrays["face_map"] = self.face_map
+        if self.lengths is not None:
+            arrays["lengths"] = self.lengths
         return arrays | {"positions": self.positions} | self.topology._asdict()
 
     def with_barriers(self, barriers: Iterable[int]) -> "TriangleMesh":
@@ -304,12 +425,7 @@ class TriangleMesh:
         free = np.setdiff1d(np.arange(len(self.faces)), np.union1d(self.barriers, added))
         if (self.inner_face[free] < 0).all():
             raise InvalidArgument("the barriers block every face: there is no surface left")
-        mesh = TriangleMesh.__new__(TriangleMesh)
-        embedding = _prepare(self.vertices - self.origin, self.faces, free)
-        mesh._hold(
-            self.vertices, self.faces, self.vertex_map, self.face_map, embedding, self._notes
-        )
-        return mesh
+        return self._among(free, self.lengths)
 
     @property
     def topology(self) -> Topology:
@@ -359,9 +475,109 @@ class TriangleMesh:
             return False
         return bool((excess > SHARP_SADDLE).mean() >= ROUGH)
 
+    @property
+    def defining_arrays(self) -> tuple[NDArray[Any], ...]:
+        """The arrays that it was made from, but for barriers: what identifies it."""
+        given = (self.vertices, self.faces)
+        return given if self.lengths is None else (*given, self.lengths)
+
+    @cached_property
+    def has_positions(self) -> bool:
+        """Whether its vertices have positions, and are not given by lengths alone."""
+        return not np.isnan(self.vertices[0, 0])
+
+    def require_positions(self, name: str) -> None:
+        """Refuse what needs positions in space, of this name, where there are none.
+
+        Parameters
+        ----------
+        name
+            What the caller asked for.
+
+        Raises
+        ------
+        InvalidArgument
+            The mesh is given by lengths alone.
+
+        Examples
+        --------
+        >>> gc.samples.plane(2).require_positions("a picture")
+        """
+        if not self.has_positions:
+            raise InvalidArgument(
+                f"{name} needs positions in space, and this mesh has lengths alone: make it by "
+                "TriangleMesh.from_lengths(faces, lengths, vertices)"
+            )
+
+    def require_own_lengths(self, name: str) -> None:
+        """Refuse what needs positions at the distances of the surface's edges.
+
+        Parameters
+        ----------
+        name
+            What the caller asked for.
+
+        Raises
+        ------
+        InvalidArgument
+            The mesh is given by lengths.
+
+        Examples
+        --------
+        >>> gc.samples.plane(2).require_own_lengths("a gradient")
+        """
+        if self.lengths is not None:
+            raise InvalidArgument(
+                f"{name} is a vector in space, which a surface given by its lengths does not have: "
+                "use angles, as those of a log map"
+            )
+
+    @cached_property
+    def bounding_positions(self) -> Floats:
+        """(V, 3): `positions` where they bound distances from below; else 0, which always does."""
+        return self.positions if self.lengths is None else _frozen(np.zeros_like(self.positions))
+
+    def bounding_position(self, point: SurfacePoint) -> Floats:
+        """Return the position of a canonical point among `bounding_positions`.
+
+        Parameters
+        ----------
+        point
+            As `point` and `locate` return it.
+
+        Returns
+        -------
+        numpy.ndarray
+            (3,) float64, mesh units.
+
+        Examples
+        --------
+        >>> mesh = gc.samples.plane(2)
+        >>> mesh.bounding_position(mesh.point_on_edge(0, 1, 0.25)).tolist()
+        [0.25, 0.0, 0.0]
+        """
+        return self.position_from_origin(point) if self.lengths is None else np.zeros(3)
+
+    @cached_property
+    def extent(self) -> float:
+        """Size of the surface, by which lengths on it round, mesh units.
+
+        That is the `diagonal`; where lengths are given, that of a square of the same area, or the
+        longest edge where that is longer.
+        """
+        if self.lengths is None:
+            return self.diagonal
+        geometry = self.topology.geometry[::3]
+        twice_areas = geometry[:, LENGTH] * geometry[:, LENGTH_LEFT] * geometry[:, SIN_LEFT]
+        return max(
+            math.sqrt(float(twice_areas.sum())), float(self.topology.geometry[:, LENGTH].max())
+        )
+
     @cached_property
     def origin(self) -> Floats:
         """(3,) mesh units: what `positions` are measured from (`build.origin_of`)."""
+        if not self.has_positions:
+            return np.zeros(3)
         v = self.topology.links[0, TAIL]  # a vertex of the surface: both differences are exact
         origin: Floats = self.vertices[self.topology.outer_vertex[v]] - self.positions[v]
         return origin
@@ -414,6 +630,7 @@ class TriangleMesh:
         >>> str(mesh.locate([0.25, 0.5, 1.0]))
         'the point (0.5, 0.25, 0.25) of face 1'
         """
+        self.require_positions("locate")
         try:
             wanted = np.asarray(position, dtype=np.float64)
         except (TypeError, ValueError):
@@ -555,6 +772,7 @@ class TriangleMesh:
         >>> mesh.position(mesh.point_on_edge(0, 1, 0.25)).tolist()
         [0.25, 0.0, 0.0]
         """
+        self.require_positions("position")
         if isinstance(point, SurfacePoint) and point.vertex_index is None:
             point = self.point(point)
             if point.vertex_index is None:
@@ -603,7 +821,13 @@ class TriangleMesh:
     @cached_property
     def report(self) -> MeshReport:
         """Counts and defects; O(V log V + F log F), computed once."""
-        return report_of(self.vertices, self.faces, self.face_map, self.embedding)
+        return report_of(
+            self.vertices,
+            self.faces,
+            self.face_map,
+            self.embedding,
+            by_lengths=self.lengths is not None,
+        )
 
     def tangent_frames(self) -> TangentFrames:
         """Return a tangent plane at each vertex, in which angles on the surface become vectors.
@@ -618,6 +842,7 @@ class TriangleMesh:
         >>> gc.samples.plane(2).tangent_frames().normals.tolist()[0]
         [0.0, 0.0, 1.0]
         """
+        self.require_positions("a tangent frame")
         return self._tangent_frames
 
     @cached_property
@@ -654,6 +879,7 @@ class TriangleMesh:
         """
         import trimesh
 
+        self.require_positions("a mesh of trimesh")
         return trimesh.Trimesh(self.vertices.copy(), self.faces.copy(), process=False)
 
     def to_pyvista(self) -> Any:
@@ -674,6 +900,7 @@ class TriangleMesh:
         >>> gc.samples.sphere(80).to_pyvista().n_points
         42
         """
+        self.require_positions("a picture")
         return plotting.surface_of(self.vertices, self.faces, "TriangleMesh.to_pyvista")
 
     def __repr__(self) -> str:
@@ -716,8 +943,14 @@ def _frozen_embedding(embedding: Embedding) -> Embedding:
     return Embedding(topology, _frozen(embedding.positions))
 
 
-def _prepare(vertices: Floats, faces: Ints, free: Longs) -> Embedding:
+def _prepared(vertices: Floats, faces: Ints, free: Longs, lengths: Floats | None) -> Embedding:
     """Return the surface of the faces that are not blocked; ``vertices`` less the origin."""
+    if lengths is not None:
+        surface = _surface_of(faces, free)
+        embedding = build.empty_embedding(len(vertices), len(surface))
+        build.build_by_lengths(vertices, faces[surface], lengths[surface], embedding)
+        embedding.topology.outer_face[:] = surface[embedding.topology.outer_face]
+        return embedding
     embedding, outcome, bad = _built(vertices, faces, free)
     if outcome == Outcome.TOO_SHORT:
         joined = lowest_joined(len(vertices), edges_of_no_length(vertices, faces[free]))
@@ -737,8 +970,8 @@ def _prepare(vertices: Floats, faces: Ints, free: Longs) -> Embedding:
     return embedding
 
 
-def _built(vertices: Floats, faces: Ints, free: Longs) -> tuple[Embedding, int, int]:
-    """Return the surface of those faces that have three different vertices, and the outcome."""
+def _surface_of(faces: Ints, free: Longs) -> Longs:
+    """Return the free faces that have three different vertices."""
     surface = free[of_three_vertices(faces.take(free, axis=0))]  # take: four times as fast as []
     if len(surface) == 0:
         raise InvalidMesh(
@@ -746,6 +979,12 @@ def _built(vertices: Floats, faces: Ints, free: Longs) -> tuple[Embedding, int, 
             kind="face",
             elements=free[:NAMED].tolist(),
         )
+    return surface
+
+
+def _built(vertices: Floats, faces: Ints, free: Longs) -> tuple[Embedding, int, int]:
+    """Return the surface of those faces that have three different vertices, and the outcome."""
+    surface = _surface_of(faces, free)
     embedding = build.empty_embedding(len(vertices), len(surface))
     outcome, bad = build.build_topology(vertices, faces.take(surface, axis=0), embedding)
     outer_face = embedding.topology.outer_face

@@ -142,9 +142,14 @@ def check_corners(corners: Longs, sizes: Longs, vertex_count: int) -> None:
         return
     bad = np.unique(np.repeat(np.arange(len(sizes)), sizes)[is_bad])
     start = int(sizes[: bad[0]].sum())
+    end = start + int(sizes[bad[0]])
+    if end - start <= NAMED:
+        said = f"is {corners[start:end].tolist()}"
+    else:
+        first = start + int(np.argmax(is_bad[start:end]))
+        said = f"has {end - start} corners, of which one is {corners[first]}"
     raise InvalidMesh(
-        f"face {bad[0]} is {corners[start : start + sizes[bad[0]]].tolist()}, but vertices are "
-        f"numbered 0 to {vertex_count - 1}{_and_more(bad)}",
+        f"face {bad[0]} {said}, but vertices are numbered 0 to {vertex_count - 1}{_and_more(bad)}",
         kind="face",
         elements=bad[:NAMED].tolist(),
     )

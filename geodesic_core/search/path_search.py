@@ -33,7 +33,7 @@ from geodesic_core.fields.path import (
     GeodesicPath,
     SearchStep,
     StepName,
-    length_of,
+    length_on,
     located_path,
     rounding_of,
     traced_path,
@@ -61,6 +61,7 @@ from geodesic_core.kernels.front.state import (
 )
 from geodesic_core.kernels.mesh.half_edges import LENGTH
 from geodesic_core.kernels.paths import edge_dijkstra, funnel
+from geodesic_core.mesh.curve import length_in_face
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.landmarks import Landmarks
@@ -185,7 +186,11 @@ class PathSearch:
         topology, wave = self.mesh.topology, self._outward
         first, last = leg.start.nearest_corner, leg.end.nearest_corner
         beside = float(leg.start.reaches.min() + leg.end.reaches.min())
-        corner = self.mesh.positions[first].copy(), np.array([first], np.int32), np.zeros(1)
+        corner = (
+            self.mesh.bounding_positions[first].copy(),
+            np.array([first], np.int32),
+            np.zeros(1),
+        )
         bounds = exact_bounds(math.inf, self._landmarks.pruning_through(*corner, math.inf))
         edge_dijkstra.search_edges(topology, wave, bounds, last, first)
         self._touched += int(wave.counters[TOUCHED])
@@ -200,7 +205,7 @@ class PathSearch:
             upper = min(upper, funnel.shortened(topology, path) * (1.0 + STRAIGHT))
         upper += beside
         if leg.start.point.face_index == leg.end.point.face_index:
-            upper = min(upper, leg.straight)
+            upper = min(upper, length_in_face(self.mesh, leg.start.point, leg.end.point))
         leg.log.add("shorten", upper)
         return upper
 
@@ -220,8 +225,8 @@ class PathSearch:
             raise leg.missed("by the merging sweep", upper)
         self._touched += int(wave.counters[TOUCHED])
         leg.log.add("approximate", upper, wave)
-        guide, _ = located_path(self.mesh, winners_of(wave, self._nearest), nodes, node)
-        upper = min(upper, length_of(guide.points))
+        guide = located_path(self.mesh, winners_of(wave, self._nearest), nodes, node)
+        upper = min(upper, length_on(self.mesh, *guide))
         leg.log.add("backtrace", upper)
         tighter = leg.loosened(leg.bound(upper))
         return upper, pruning_bounds._replace(
@@ -269,7 +274,7 @@ class _End:
 
     def __init__(self, mesh: TriangleMesh, point: SurfacePoint) -> None:
         self.point = point
-        self.position: Floats = mesh.position_from_origin(point)
+        self.position: Floats = mesh.bounding_position(point)
         self.corners, self.reaches = corners_of(mesh, point)
 
     @property
@@ -297,7 +302,7 @@ class _Leg(NamedTuple):
 
     @property
     def straight(self) -> float:
-        """Distance of its ends as the crow flies."""
+        """Lower bound of the distance of its ends: as the crow flies, where that is one."""
         return float(np.linalg.norm(self.start.position - self.end.position))
 
     def bound(self, upper: float) -> float:

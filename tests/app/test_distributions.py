@@ -20,6 +20,7 @@ from tests.support.fresh import told_by
 from tests.support.paths import ROOT
 
 LIBRARY, SERVICE, CLIENT = ROOT / "geodesic_core", ROOT, ROOT / "client"
+LOCK = ROOT / "requirements.lock"
 
 
 def project(folder: Path) -> dict[str, Any]:
@@ -45,11 +46,34 @@ def test_all_have_one_version_and_the_service_requires_that_of_the_library() -> 
 def test_all_ask_for_the_same_of_python_and_of_what_they_share() -> None:
     library, service = requirements(LIBRARY), requirements(SERVICE)
     shared = library.keys() & service.keys()
-    assert shared >= {"numpy", "scipy", "filelock"}
+    assert shared >= {"numpy", "scipy"}
     assert {name: library[name] for name in shared} == {name: service[name] for name in shared}
     assert requirements(CLIENT)["numpy"] == library["numpy"]
     pythons = {project(folder)["requires-python"] for folder in (LIBRARY, SERVICE, CLIENT)}
     assert len(pythons) == 1
+
+
+def test_the_lock_has_a_version_of_all_that_is_required() -> None:
+    lines = map(Requirement, filter(None, map(uncommented, LOCK.read_text().splitlines())))
+    here = (each for each in lines if each.marker is None or each.marker.evaluate())
+    locked = {canonicalize_name(each.name): str(each.specifier) for each in here}
+    for folder in (LIBRARY, SERVICE, CLIENT):
+        for name, versions in requirements(folder).items():
+            required = Requirement(name + versions)
+            if required.name.startswith("geodesic"):
+                continue
+            if required.marker is None or required.marker.evaluate():
+                version = locked[canonicalize_name(required.name)].removeprefix("==")
+                assert version in required.specifier, required
+
+
+def uncommented(line: str) -> str:
+    return line.partition("#")[0].strip()
+
+
+def test_the_lock_names_no_place() -> None:
+    """Whoever installs has a registry of their own."""
+    assert not re.search("://|^-|@", LOCK.read_text(), re.MULTILINE)
 
 
 def test_the_client_brings_neither_compiler_nor_web_framework() -> None:

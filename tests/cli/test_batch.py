@@ -13,7 +13,6 @@ import pytest
 import geodesic_core as gc
 from app.cli import batch
 from app.cli.batch_rows import Questions, Row, ask
-from app.cli.parcels import parcels_of
 from app.cli.points import Point
 from tests.support.commands import Run, error_line
 
@@ -145,25 +144,6 @@ def test_ctrl_c_does_not_wait_for_the_meshes_under_way(
     assert (ran.code, ran.err) == (130, "error: interrupted\n")
     assert not Path("t.csv").exists()
     assert set(multiprocessing.active_children()) == others
-
-
-def test_small_meshes_are_handed_over_together_and_large_ones_alone(tmp_path: Path) -> None:
-    sizes = [1000, 1000, 9 << 20, 0, *[1000] * 40]
-    meshes = [tmp_path / f"{number}.ply" for number in range(len(sizes))]
-    for mesh, size in zip(meshes, sizes, strict=True):
-        mesh.touch()
-        os.truncate(mesh, size)
-    missing = tmp_path / "missing.ply"
-    parcels = list(parcels_of([*meshes, missing], 1))
-    assert parcels[:2] == [meshes[:2], [meshes[2]]]
-    assert [mesh for parcel in parcels for mesh in parcel] == [*meshes, missing]
-    lengths = [len(parcel) for parcel in parcels[2:]]
-    assert lengths[0] == 6, "one without a size, and an eighth of the others"
-    assert lengths == sorted(lengths, reverse=True), "fewer at the end"
-    assert lengths[-9:] == [1] * 9
-    # Of a few meshes each process gets some.
-    some = [meshes[0], meshes[1], meshes[5]]
-    assert list(parcels_of(some, 2)) == [[mesh] for mesh in some]
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ import json
 import re
 import signal
 from collections.abc import Callable
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -158,98 +157,11 @@ def knot(run: Run) -> Path:
     return Path("knot.ply")
 
 
-@pytest.mark.parametrize(
-    ("options", "errors", "bound"),
-    [
-        ("", {}, "0.001 (relative, guaranteed)"),
-        ("--relative-error 0.05", {"relative_error": 0.05}, "0.002 (relative, guaranteed)"),
-        (
-            "--absolute-error 0.02",
-            {"relative_error": None, "absolute_error": 0.02},
-            "0.02 (absolute, guaranteed)",
-        ),
-        (
-            "--relative-error 0.05 --absolute-error 0.02",
-            {"relative_error": 0.05, "absolute_error": 0.02},
-            "0.002 (relative, guaranteed)",
-        ),
-    ],
-)
-def test_approximate_distances_are_the_library_s(
-    run: Run, knot: Path, options: str, errors: dict[str, Any], bound: str
-) -> None:
-    mesh = gc.load_mesh(knot)
-    sources = ["--source", 3, "--source", 700]
-    ran = run(
-        "distance", knot, *sources, "--method", "approximate", *options.split(), "--out", "d.json"
-    )
-    assert (ran.code, ran.err) == (0, "")
-    assert ran.figure("error bound") == bound
-    answer = json.loads(Path("d.json").read_text())
-    expected = gc.approximate_distance(mesh, [3, 700], **errors)
-    assert answer["distances"] == expected.distances.tolist()
-    assert answer["error_bound"] == asdict(expected.error_bound)
-    exact = gc.exact_distance(mesh, [3, 700]).distances
-    share = errors.get("relative_error", 1e-3) or 1.0
-    assert (expected.distances <= exact * (1 + 1e-9)).all()
-    assert (exact - expected.distances <= share * exact).all()
-    assert (exact - expected.distances <= errors.get("absolute_error", np.inf)).all()
-
-
-@pytest.mark.parametrize("effort", [None, 1, 8])
-def test_fast_distances_are_the_library_s(run: Run, knot: Path, effort: int | None) -> None:
-    options = [] if effort is None else ["--effort", effort]
-    ran = run("distance", knot, "--source", 3, "--method", "fast", *options, "--out", "d.json")
-    assert (ran.code, ran.err) == (0, "")
-    answer = json.loads(Path("d.json").read_text())
-    expected = gc.fast_distance(gc.load_mesh(knot), 3, effort or 2)
-    assert answer["distances"] == expected.distances.tolist()
-    assert answer["error_bound"] == asdict(expected.error_bound)
-    assert ran.figure("error bound") == f"{expected.error_bound.value!r} (relative, estimated)"
-
-
 def test_exact_distances_have_no_error(run: Run, plane: Path) -> None:
     for options in ([], ["--method", "exact"]):
         ran = run("distance", plane, "--source", 0, *options, "--out", "d.json")
         assert ran.figure("error bound") == "0.0 (relative, guaranteed)"
         assert json.loads(Path("d.json").read_text())["error_bound"]["value"] == 0
-
-
-def test_approximate_distances_stop_at_max_distance(run: Run, knot: Path) -> None:
-    options = ["--method", "approximate", "--relative-error", 0.05, "--max-distance", 2]
-    ran = run("distance", knot, "--source", 3, *options, "--out", "d.npy")
-    assert ran.code == 0
-    exact = gc.exact_distance(gc.load_mesh(knot), 3).distances
-    reached = np.isfinite(np.load("d.npy"))
-    assert 0 < reached.sum() < len(reached)
-    assert reached[exact <= 2].all()
-    assert (exact[reached] <= 2 / 0.95).all()
-
-
-@pytest.mark.parametrize(
-    ("options", "errors"),
-    [
-        ("", {}),
-        ("--relative-error 0.05", {"relative_error": 0.05}),
-        ("--absolute-error 0.1", {"relative_error": None, "absolute_error": 0.1}),
-    ],
-)
-def test_an_approximate_path_reports_its_own_bound(
-    run: Run, knot: Path, options: str, errors: dict[str, Any]
-) -> None:
-    ends = ["--source", 3, "--target", 700]
-    ran = run("path", knot, *ends, "--method", "approximate", *options.split(), "--out", "p.json")
-    assert (ran.code, ran.err) == (0, "")
-    mesh = gc.load_mesh(knot)
-    expected = gc.approximate_distance(mesh, 3, **errors, retain="paths").path_to(700)
-    assert ran.figure("length") == repr(expected.length)
-    value = expected.error_bound.value
-    assert ran.figure("error bound") == f"{value!r} (relative, guaranteed)"
-    answer = json.loads(Path("p.json").read_text())
-    assert answer["points"] == expected.points.tolist()
-    assert answer["error_bound"] == asdict(expected.error_bound)
-    exact = gc.shortest_path(mesh, 3, 700).length
-    assert exact * (1 - 1e-9) <= expected.length <= exact * (1 + value + 1e-9)
 
 
 def test_path_writes_a_polyline_and_json(run: Run, plane: Path) -> None:
@@ -316,25 +228,6 @@ def test_a_path_by_way_of_others_tells_its_steps(run: Run, plane: Path) -> None:
     assert [step["faces"] for step in answer["steps"]] == [
         step.faces.tolist() for step in expected.steps
     ]
-
-
-@pytest.mark.parametrize("method", ["exact", "approximate"])
-def test_paths_between_points_that_are_no_vertices(run: Run, knot: Path, method: str) -> None:
-    mesh = gc.load_mesh(knot)
-    start, end = mesh.faces[900, :2].tolist()
-    source, target = gc.SurfacePoint.face(40, (0.2, 0.3, 0.5)), mesh.point_on_edge(start, end, 0.3)
-    if method == "exact":
-        expected = gc.shortest_path(mesh, source, target)
-    else:
-        field = gc.approximate_distance(mesh, source, targets=[target], retain="paths")
-        expected = field.path_to(target)
-
-    ends = ["--source", "f40:0.2,0.3,0.5", "--target", f"e{start}-{end}:0.3"]
-    ran = run("path", knot, *ends, "--method", method, "--out", "p.json")
-
-    assert (ran.code, ran.err) == (0, "")
-    assert ran.figure("length") == repr(expected.length)
-    assert json.loads(Path("p.json").read_text())["points"] == expected.points.tolist()
 
 
 @pytest.mark.slow
@@ -412,18 +305,6 @@ def test_paths_are_written_with_those_that_are_not_there(run: Run, knot: Path) -
     assert numbers == list(map(str, range(1, len(points) + 1)))
 
 
-def test_approximate_paths_report_their_own_bounds(run: Run, knot: Path) -> None:
-    errors = ["--method", "approximate", "--relative-error", 0.05]
-    targets = point_options("--target", 700, 20)
-    ran = run("paths", knot, "--source", 3, *targets, *errors, "--out", "p.json")
-    field = gc.approximate_distance(gc.load_mesh(knot), 3, 0.05, retain="windows")
-    assert ran.code == 0
-    for found, target in zip(
-        json.loads(Path("p.json").read_text())["paths"], (700, 20), strict=True
-    ):
-        assert found["error_bound"] == asdict(field.path_to(target).error_bound)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("limit", [None, 4.0])
 def test_matrices_are_the_library_s(run: Run, knot: Path, limit: float | None) -> None:
@@ -489,30 +370,6 @@ def test_nearest_prints_candidates_as_they_were_written(run: Run, knot: Path) ->
     limit = ["--max-distance", expected.distances[0]]
     ran = run("nearest", knot, "--source", 3, *candidates, "-k", 3, *limit)
     assert ran.figure("found") == "1 of 3"
-
-
-def test_curves_are_sources(run: Run, knot: Path) -> None:
-    """The points of a path, as they are written, in each command that takes curves."""
-    mesh = gc.load_mesh(knot)
-    line = gc.shortest_path(mesh, 3, 700).locations
-    written = "/".join(
-        f"f{place.face_index}:{','.join(map(repr, place.barycentric))}" for place in line
-    )
-    field = gc.exact_distance(mesh, [gc.Curve(line), 40])
-    along = gc.exact_distance(mesh, gc.Curve(line))
-
-    sources = point_options("--source", written, 40)
-    assert run("distance", knot, *sources, "--out", "d.npy").code == 0
-    np.testing.assert_array_equal(np.load("d.npy"), field.distances)
-    assert run("distance", knot, *sources, "--out", "d.json").code == 0
-    curve, point = json.loads(Path("d.json").read_text())["sources"]
-    assert len(curve["polyline"]) == len(line)
-    assert point["vertex"] == 40
-    ran = run("paths", knot, "--source", written, "--target", 900, "--out", "p.json")
-    assert repr(along.path_to(900).length) in ran.out
-    ran = run("isolines", knot, *sources, "--level", 0.5, "--out", "l.json")
-    drawn = json.loads(Path("l.json").read_text())["isolines"][0]["lines"]
-    assert [each["length"] for each in drawn] == [each.length for each in field.isolines([0.5])[0]]
 
 
 @pytest.mark.parametrize("method", ["exact", "approximate"])

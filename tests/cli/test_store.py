@@ -15,7 +15,7 @@ from app.store.fields import FieldStore
 from app.store.ownership import owned
 from app.store.results import ResultManifest
 from tests.support.commands import Run, error_line
-from tests.support.faults import edit_counts
+from tests.support.faults import edit_counts, flip_bytes
 from tests.support.postgres import SECRET
 from tests.support.postgres import Server as Postgres
 from tests.support.service import serving, upload_sample, wait_until
@@ -88,15 +88,9 @@ def left(original: Left, tmp_path: Path) -> Left:
     return Left(tmp_path / "store", original.ids, original.job)
 
 
-def damage(path: Path) -> None:
-    content = bytearray(path.read_bytes())
-    content[-1] ^= 1
-    path.write_bytes(content)
-
-
 def test_ls(run: Run, left: Left) -> None:
     for number, mesh_id in enumerate(reversed(left.ids)):
-        os.utime(left.root / "meshes" / mesh_id, (number, number))
+        os.utime(left.root / "meshes" / mesh_id / "manifest.json", (number, number))
     before = left.files()
 
     ran = run("store", "ls", left.root)
@@ -142,9 +136,9 @@ def test_check_names_what_is_damaged(run: Run, left: Left) -> None:
     assert json.loads(run("store", "check", left.root, "--json").out) == {"damaged": []}
 
     for name in ("faces", "component"):
-        damage(left.root / "meshes" / left.ids[0] / f"{name}.npy")
+        flip_bytes(left.root / "meshes" / left.ids[0] / f"{name}.npy")
     edit_counts(left.root / "meshes" / left.ids[1] / "manifest.json")
-    damage(left.results(0)[1])
+    flip_bytes(left.results(0)[1])
     left.results(0)[2].with_suffix(".json").write_bytes(b"{")
     left.fields()[1].write_bytes(b"PK")
     (left.root / "jobs.sqlite3").write_bytes(b"nothing" * 999)
@@ -171,7 +165,7 @@ def test_prune(run: Run, left: Left) -> None:
     """What nobody needs goes, each for its reason; meshes stay, and so do answers of jobs."""
     damaged, outdated, kept = left.results(0)
     (held,) = left.results(1)
-    damage(damaged)
+    flip_bytes(damaged)
     for body in (outdated, held):
         manifest = ResultManifest.model_validate_json(body.with_suffix(".json").read_bytes())
         assert manifest.code
@@ -186,7 +180,7 @@ def test_prune(run: Run, left: Left) -> None:
     kept.with_name("tmp123").write_bytes(b"1234567")
     (left.root / "tmp" / "upload").mkdir()
     (left.root / "tmp" / "upload" / "mesh").write_bytes(b"12345")
-    damage(left.root / "meshes" / left.ids[0] / "faces.npy")
+    flip_bytes(left.root / "meshes" / left.ids[0] / "faces.npy")
     left.fields()[1].write_bytes(b"PK")
     write_field(left, left.ids[0], "3", "an older one")
     write_field(left, left.ids[1], "1", code_version())
@@ -288,14 +282,6 @@ def test_what_is_no_store_is_refused(run: Run, tmp_path: Path, command: str) -> 
     assert "has layout 8, but this release reads 7" in error_line(ran)
 
 
-@pytest.mark.parametrize("command", ["ls", "check", "prune"])
-def test_an_older_store_is_for_the_service_to_convert(run: Run, left: Left, command: str) -> None:
-    (left.root / "VERSION").write_text("5\n")
-    ran = run("store", command, left.root)
-    assert ran.code == 1
-    assert "has layout 5, but this release reads 7: start the service on it" in error_line(ran)
-
-
 def test_serve_refuses_a_store_that_it_cannot_have(
     run: Run,
     tmp_path: Path,
@@ -313,7 +299,7 @@ def test_serve_refuses_a_store_that_it_cannot_have(
     (tmp_path / "store" / "VERSION").write_text("4.5")
     ran = run("serve")
     assert ran.code == 1
-    assert "has layout '4.5'" in error_line(ran)
+    assert "has layout 4.5" in error_line(ran)
 
 
 def test_a_store_by_its_url(run: Run, tmp_path: Path) -> None:

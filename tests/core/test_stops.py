@@ -13,7 +13,7 @@ import pytest
 import geodesic_core as gc
 from geodesic_core import control
 from geodesic_core.errors import Cancelled, DeadlineExceeded, InvalidArgument, MemoryLimitExceeded
-from geodesic_core.fields import fast_sweep, sweep
+from geodesic_core.fields import fast_sweep, straight_lines, sweep
 from tests.support import zoo
 from tests.support.searches import answer, landmark_count
 
@@ -118,6 +118,7 @@ def slices_by_number(monkeypatch: pytest.MonkeyPatch) -> None:
     for module in (sweep, fast_sweep):
         monkeypatch.setattr(module, "_FIRST_BUDGET", 2000)
     monkeypatch.setattr(control, "_FIRST_ITEMS", 8)
+    monkeypatch.setattr(straight_lines, "_TRAIL", 100)
 
 
 def bits(found: Any) -> Any:

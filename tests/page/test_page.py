@@ -145,7 +145,7 @@ def test_a_long_list_of_meshes_goes_on(view: View, sphere: str, knot: str) -> No
         view.page.select_option("#meshes", "more")
         expect(options.nth(len(ids))).not_to_have_attribute("value", "more")
 
-    assert ids == sorted(set(ids))
+    assert len(ids) == len(set(ids))
     assert {sphere, knot} <= set(ids)
     view.page.select_option("#meshes", knot)
     view.wait()
@@ -698,7 +698,7 @@ def test_downloads(view: View, knot: str, tmp_path: Path) -> None:
     assert (np.abs(picture - PATH).max(axis=2) < 12).sum() > 100
 
     written = set(httpx2.get(view.page.url.split("/?")[0] + "/v1").json()["answer_formats"])
-    for what, formats in {"path": {"obj", "svg", "csv"}, "isolines": {"obj", "svg"}}.items():
+    for what, formats in {"path": {"obj", "csv"}, "isolines": {"obj", "csv"}}.items():
         offered = {text.lower() for text in view.text(f"#download-{what}").split()}
         assert offered == formats & written
 

@@ -1,7 +1,6 @@
 """Approximate answers: what they promise, and how they differ from exact ones."""
 
 import json
-from io import BytesIO
 from typing import Any
 
 import numpy as np
@@ -9,13 +8,8 @@ import pytest
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
-from app.queries import PathQuery, result_key
-from app.schemas.points import VertexPoint
-from app.schemas.requests import PathRequest
-from tests.support.service import NPY, check_problem, distances, stored_mesh, upload_sample
+from tests.support.service import check_problem, distances, stored_mesh, upload_sample
 
-ROUNDING = 1e-9
-SOURCES = [{"vertex": 3}, {"vertex": 400, "start_distance": 0.25}]
 ENDS = {"source": {"vertex": 3}, "target": {"vertex": 700}}
 WRITTEN_ENDS = "from=v3&to=v700"
 
@@ -46,62 +40,6 @@ def test_distances_are_the_library_s(client: TestClient, knot: str) -> None:
     assert answer["method"] == "approximate"
     assert answer["error_bound"] == {"type": "relative", "value": 0.002, "kind": "guaranteed"}
     assert answer["stats"]["windows_kept"] == field.stats.windows_kept
-
-
-@pytest.mark.parametrize("sources", [SOURCES[:1], SOURCES], ids=["one", "two"])
-@pytest.mark.parametrize(
-    ("errors", "bound"),
-    [
-        ({}, ("relative", 1e-3)),
-        ({"relative_error": 0.05}, ("relative", 0.002)),
-        ({"absolute_error": 0.02}, ("absolute", 0.02)),
-        ({"relative_error": None, "absolute_error": 0.02}, ("absolute", 0.02)),
-        ({"relative_error": 0.05, "absolute_error": 0.02}, ("relative", 0.002)),
-    ],
-)
-def test_distances_fall_short_by_no_more_than_the_bound(
-    client: TestClient, knot: str, sources: list, errors: dict, bound: tuple[str, float]
-) -> None:
-    body = {"sources": sources, "include": ["nearest_source"]}
-    exact = distances(client, knot, **body).json()
-    answer = approximate(client, knot, **body, **errors).json()
-
-    assert answer["error_bound"] == {"type": bound[0], "value": bound[1], "kind": "guaranteed"}
-    ours, theirs = np.array(answer["distances"]), np.array(exact["distances"])
-    assert (ours <= theirs * (1 + ROUNDING)).all()
-    promised = errors or {"relative_error": 1e-3}
-    if share := promised.get("relative_error"):
-        assert (ours >= theirs * (1 - share)).all()
-    if length := promised.get("absolute_error"):
-        assert (ours >= theirs - length).all()
-    assert answer["stats"]["windows_kept"] < exact["stats"]["windows_kept"]
-    assert set(answer["nearest_source"]) == set(exact["nearest_source"])
-    assert answer["sources"] == exact["sources"]
-
-
-def test_max_distance_loses_no_vertex_that_is_near_enough(client: TestClient, knot: str) -> None:
-    body = {"sources": SOURCES, "max_distance": 2.0}
-    exact = np.load(BytesIO(distances(client, knot, NPY, **body).content))
-    answer = approximate(client, knot, **body, relative_error=0.05).json()
-    ours = np.array(answer["distances"], float)  # null becomes NaN
-
-    reached = np.isfinite(ours)
-    assert 0 < reached.sum() < len(ours)
-    assert reached[np.isfinite(exact)].all()
-    assert (ours[reached] <= 2.0).all()
-    whole = np.array(distances(client, knot, sources=SOURCES).json()["distances"])
-    assert (ours[reached] >= whole[reached] * 0.95).all()
-    missed = np.count_nonzero(~reached)
-    assert answer["unreachable"] == {"disconnected": 0, "beyond_max_distance": missed}
-
-
-def test_targets_only(client: TestClient, knot: str) -> None:
-    targets = [{"vertex": 700}, {"vertex": 3}]
-    everywhere = approximate(client, knot, sources=SOURCES).json()["distances"]
-
-    answer = approximate(client, knot, sources=SOURCES, targets=targets).json()
-
-    assert answer["distances"] == [everywhere[700], everywhere[3]]
 
 
 @pytest.mark.parametrize("name", ["npy", "octets"])
@@ -154,20 +92,6 @@ def test_the_usual_error_is_one_result_with_its_spelling(client: TestClient, kno
     assert spelt.headers["etag"] == bare.headers["etag"]
 
 
-def test_keys_tell_methods_and_errors_apart() -> None:
-    bounds: list[dict[str, Any]] = [
-        {},
-        {"method": "approximate", "relative_error": 1e-3},
-        {"method": "approximate", "absolute_error": 1e-3},
-        {"method": "approximate", "relative_error": 0.1, "absolute_error": 1e-3},
-    ]
-
-    ends = {"source": VertexPoint(vertex=0), "target": VertexPoint(vertex=1)}
-    keys = {result_key(PathQuery("m", PathRequest(**ends, **errors))) for errors in bounds}
-
-    assert len(keys) == len(bounds)
-
-
 # Paths
 
 
@@ -189,21 +113,6 @@ def test_paths_are_the_library_s(client: TestClient, knot: str) -> None:
     }
 
 
-@pytest.mark.parametrize("errors", [{}, {"relative_error": 0.05}, {"absolute_error": 0.1}])
-def test_a_path_carries_its_own_certificate(client: TestClient, knot: str, errors: dict) -> None:
-    exact = path(client, knot).json()["length"]
-    targets = [ENDS["target"]]
-    field = approximate(client, knot, sources=[ENDS["source"]], targets=targets, **errors).json()
-
-    answer = path(client, knot, method="approximate", **errors).json()
-
-    bound, (distance,) = answer["error_bound"], field["distances"]
-    assert (bound["type"], bound["kind"]) == ("relative", "guaranteed")
-    assert bound["value"] == pytest.approx((answer["length"] - distance) / distance, abs=1e-15)
-    assert answer["length"] >= exact * (1 - ROUNDING)
-    assert answer["length"] <= exact * (1 + bound["value"] + ROUNDING)
-
-
 def test_get_answers_as_post_and_is_cached(client: TestClient, knot: str) -> None:
     link = f"/v1/meshes/{knot}/path?{WRITTEN_ENDS}"
     rough = f"{link}&method=approximate"
@@ -216,24 +125,6 @@ def test_get_answers_as_post_and_is_cached(client: TestClient, knot: str) -> Non
         response = client.get(other, headers={"If-None-Match": got.headers["etag"]})
         assert response.status_code == 200
         assert response.headers["etag"] != got.headers["etag"]
-
-
-def test_headers_of_a_binary_path(client: TestClient, knot: str) -> None:
-    body = {"method": "approximate", "relative_error": 0.05}
-    answer = path(client, knot, **body).json()
-
-    npy = path(client, knot, NPY, **body)
-
-    np.testing.assert_array_equal(np.load(BytesIO(npy.content)), answer["points"])
-    assert npy.headers["geodesic-method"] == "approximate"
-    assert json.loads(npy.headers["geodesic-error-bound"]) == answer["error_bound"]
-
-
-def test_a_path_to_its_own_source_has_no_error(client: TestClient, knot: str) -> None:
-    answer = path(client, knot, method="approximate", target=ENDS["source"]).json()
-
-    assert (answer["length"], len(answer["points"])) == (0, 1)
-    assert answer["error_bound"]["value"] == 0
 
 
 def test_no_path_is_an_answer(client: TestClient, apart: str) -> None:
@@ -292,19 +183,6 @@ def test_refused_errors_of_a_get(client: TestClient, knot: str, query: str, name
 
     problem = check_problem(response, 422, "invalid_request")
     assert [fault["pointer"] for fault in problem["errors"]] == [f"/query/{name}"]
-
-
-@pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999"])
-@pytest.mark.parametrize("name", ["relative_error", "absolute_error"])
-def test_errors_that_are_not_finite(client: TestClient, knot: str, name: str, number: str) -> None:
-    response = client.post(
-        f"/v1/meshes/{knot}/distances",
-        content=f'{{"sources": [{{"vertex": 0}}], "method": "approximate", "{name}": {number}}}',
-        headers={"Content-Type": "application/json"},
-    )
-
-    problem = check_problem(response, 422, "invalid_request")
-    assert [fault["pointer"] for fault in problem["errors"]] == [f"/{name}"]
 
 
 def test_exact_refuses_an_error_with_a_reason(client: TestClient, knot: str) -> None:

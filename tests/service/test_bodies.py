@@ -205,9 +205,8 @@ def test_who_hangs_up_within_a_body_holds_nothing(client: ServiceClient, path: s
 def test_small_bodies_need_no_thread(
     client: TestClient, plane: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(
-        large_bodies.to_thread, "run_sync", lambda *_, **__: pytest.fail("a thread")
-    )
+    no_threads = SimpleNamespace(run_sync=lambda *_, **__: pytest.fail("a thread"))
+    monkeypatch.setattr(large_bodies, "to_thread", no_threads)
     body = LocateQuery.model.model_validate({"points": [[0, 0, 0]]}).model_dump()
     assert client.post(f"/v1/meshes/{plane}/locate", json=body).status_code == 200
 

@@ -95,14 +95,14 @@ def knot_file(tmp_path: Path) -> Path:
             },
         ),
         (
-            "isolines --source 3 --level 0.5 --level 2.5",
+            "isolines --source 3 --level 0.5 --level 2.5 --chord-error 0.01",
             "isolines",
-            {"sources": [{"vertex": 3}], "levels": [0.5, 2.5]},
+            {"sources": [{"vertex": 3}], "levels": [0.5, 2.5], "chord_error": 0.01},
         ),
         (
-            f"isolines --source 3 --count 3 --chord-error 0.01 {AS_APPROXIMATE}",
+            f"isolines --source 3/3 --count 3 {AS_APPROXIMATE} --absolute-error 0.02",
             "isolines",
-            {"sources": [{"vertex": 3}], "count": 3, "chord_error": 0.01, **APPROXIMATE},
+            {"sources": [CURVE], "count": 3, **APPROXIMATE, "absolute_error": 0.02},
         ),
         *(
             (

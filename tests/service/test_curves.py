@@ -57,19 +57,6 @@ def test_distances_are_the_library_s(client: TestClient, method: dict) -> None:
     assert other["vertex"] == 1200
 
 
-def test_distances_from_a_line_in_the_plane(client: TestClient, plane: str) -> None:
-    """From all of the line, not of its points alone, however these are written."""
-    bottom = [{"vertex": 0}, {"edge": [0, 1], "t": 0.5}, {"position": [0.1, 0, 0]}]
-    bottom += [{"edge": [2, 1], "t": 0}, *({"vertex": i} for i in range(3, 11))]
-    heights = stored_mesh(client, plane).vertices[:, 1]
-
-    answer = distances(client, plane, sources=[{"polyline": bottom}], include=["gradient"]).json()
-
-    np.testing.assert_allclose(answer["distances"], heights, atol=1e-12)
-    up = np.array(answer["gradient"], float)[heights > 0]
-    np.testing.assert_allclose(up, np.tile([0.0, 1.0, 0.0], (len(up), 1)), atol=1e-9)
-
-
 def test_a_curve_may_be_a_point(client: TestClient, plane: str) -> None:
     point, curve, still = (
         distances(client, plane, sources=[source]).json()

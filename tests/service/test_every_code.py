@@ -20,7 +20,7 @@ from app.errors import CODES, StateUnavailableError, StoreUnavailableError
 from app.jobs import JobRepository
 from app.main import create_app
 from app.settings import Settings
-from app.store.folder_meshes import FolderMeshes
+from app.store.mesh_home import MeshHome
 from tests.support.disks import fill_disk
 from tests.support.listening import listening, read_answer
 from tests.support.processes import stopped
@@ -178,10 +178,10 @@ def no_state(site: Site) -> Any:
 
 
 def no_store(site: Site) -> Any:
-    async def away(_meshes: FolderMeshes, _mesh_id: str) -> Any:
+    async def away(_meshes: MeshHome, _mesh_id: str) -> Any:
         raise StoreUnavailableError
 
-    site.patch.setattr(FolderMeshes, "manifest", away)
+    site.patch.setattr(MeshHome, "manifest", away)
     return site.client.get(f"/v1/meshes/{site.small}")
 
 

@@ -35,7 +35,7 @@ def make_up_requests(names: dict[str, str], url: str, folder: Path, *options: st
             *("--request-timeout", str(LONG_S)),  # ten seconds would ask for a pace
             *("--report", "ndjson", "--report-ndjson-path", str(report)),
         ],
-        env=os.environ | names,
+        env=os.environ | names | {"HOOKS": str(CONFIGURATION.with_name("schemathesis_hooks.py"))},
         cwd=folder,
         capture_output=True,
         text=True,

@@ -74,38 +74,6 @@ def test_lines_are_the_library_s(client: TestClient, knot: str, method: dict) ->
         assert answer["stats"]["windows_created"] == field.stats.windows_created
 
 
-def test_lines_in_the_plane_are_circles(client: TestClient, plane: str) -> None:
-    answer = isolines(
-        client,
-        plane,
-        sources=[{"position": [0.5, 0.5, 0]}],
-        levels=[0.3, 0.6],
-        chord_error=1e-4,
-    ).json()
-
-    inner, outer = answer["isolines"]
-    assert [line["closed"] for line in inner["lines"]] == [True]
-    assert [line["closed"] for line in outer["lines"]] == [False] * 4, "cut off by the sides"
-    for level in (inner, outer):
-        for line in level["lines"]:
-            away = np.linalg.norm(np.array(line["points"]) - [0.5, 0.5, 0], axis=1)
-            np.testing.assert_allclose(away, level["level"], rtol=1e-12)
-    assert inner["lines"][0]["length"] == pytest.approx(2 * np.pi * 0.3, rel=1e-3)
-
-
-def test_lines_around_a_curve_are_straight_beside_it(client: TestClient, plane: str) -> None:
-    ends = [[0.46, 0.41, 0], [0.49, 0.41, 0]]
-    curve = {"polyline": [{"position": end} for end in ends]}
-    answer = isolines(client, plane, sources=[curve], levels=[0.2], chord_error=1e-5).json()
-
-    (line,) = answer["isolines"][0]["lines"]
-    assert line["closed"]
-    assert line["length"] == pytest.approx(2 * np.pi * 0.2 + 2 * 0.03, rel=1e-3)
-    assert [point["position"] for point in answer["sources"][0]["polyline"]] == [
-        pytest.approx(end) for end in ends
-    ]
-
-
 def test_lines_end_at_barriers(client: TestClient, plane: str) -> None:
     wall = list(range(100, 116))
     field = gc.exact_distance(stored_mesh(client, plane), 0, barriers=wall)
@@ -157,20 +125,6 @@ def test_the_grant_is_in_force_throughout(
         with pytest.raises(gc.errors.Cancelled):
             query.answer(opened, context(cancel))
         assert checks == stop_at
-
-
-def test_components_without_a_source_have_no_lines(client: TestClient, apart: str) -> None:
-    (level,) = isolines(client, apart, levels=[0.5]).json()["isolines"]
-
-    (line,) = level["lines"]
-    assert set(line["faces"]) == {0}
-
-
-@pytest.mark.usefixtures("one_replica")
-def test_the_same_lines_are_not_drawn_again(client: TestClient, knot: str) -> None:
-    first, again = (isolines(client, knot, count=2, max_distance=3.5) for _ in range(2))
-
-    assert (again.content, again.headers["server-timing"]) == (first.content, "kept")
 
 
 @pytest.mark.parametrize(

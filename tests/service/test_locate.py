@@ -11,7 +11,7 @@ import geodesic_core as gc
 from app.queries import LocateQuery
 from app.store.meshes import OpenMesh
 from geodesic_core.mesh.closest_point import NearestFace
-from tests.support.service import NPY, check_problem, context, serving, stored_mesh, upload_sample
+from tests.support.service import check_problem, context, serving, stored_mesh, upload_sample
 
 
 def locate(client: TestClient, mesh_id: str, headers: Any = None, **body: Any) -> Any:
@@ -49,19 +49,6 @@ def test_points_are_the_library_s(client: TestClient, knot: str) -> None:
     assert 0.0 in answer["points"][25]["barycentric"]
 
 
-def test_the_nearest_point_of_two_triangles(client: TestClient, apart: str) -> None:
-    positions = [[0.25, 0.25, 2], [-3, 0, 4], [0.5, -1, 0], [9, 7, 0]]
-
-    points = locate(client, apart, points=positions).json()["points"]
-
-    assert points[0]["face"] == 0
-    np.testing.assert_allclose(points[0]["barycentric"], [0.5, 0.25, 0.25], atol=1e-15)
-    assert points[0]["distance"] == 2
-    assert points[1] == {"vertex": 0, "position": [0, 0, 0], "distance": 5}
-    assert points[2]["barycentric"] == [0.5, 0.5, 0]
-    assert points[3] == {"vertex": 5, "position": [9, 1, 0], "distance": 6}
-
-
 def test_what_misses_is_null(client: TestClient, apart: str) -> None:
     positions = [[0, 0, 1], [0, 0, 1.5], [0, 0, 1e300], [0, 0, 0]]
 
@@ -81,29 +68,6 @@ def test_a_vertex_of_no_face_is_not_on_the_surface(client: TestClient) -> None:
     assert answer["points"][0]["face"] == 0
     assert answer["points"][0]["distance"] > 5
     assert "no face" in answer["warnings"][0]
-
-
-def test_found_points_are_points_of_queries(client: TestClient, knot: str) -> None:
-    mesh = stored_mesh(client, knot)
-    position = [1.0, 2.0, 0.5]
-    found = locate(client, knot, points=[position]).json()["points"][0]
-    point = {name: found[name] for name in ("face", "barycentric")}
-    link = f"/v1/meshes/{knot}/path"
-
-    by_echo = client.post(link, json={"source": point, "target": {"vertex": 0}})
-    by_position = client.get(f"{link}?from=p1,2,0.5&to=v0")
-
-    assert by_echo.content == by_position.content
-    assert by_echo.json()["length"] == gc.shortest_path(mesh, mesh.locate(position), 0).length
-
-
-@pytest.mark.usefixtures("one_replica")
-def test_the_same_points_are_not_looked_for_again(client: TestClient, knot: str) -> None:
-    first, again = (locate(client, knot, points=[[0, 0, 0.125]]) for _ in range(2))
-
-    assert again.content == first.content
-    assert again.headers["server-timing"] == "kept"
-    assert again.headers["cache-control"] == "no-store"
 
 
 @pytest.mark.parametrize(
@@ -128,23 +92,6 @@ def test_refused_bodies(
     problem = check_problem(locate(client, apart, **body), 422, code)
 
     assert [fault["pointer"] for fault in problem["errors"]] == places
-
-
-def test_it_does_not_come_as_an_array(client: TestClient, apart: str) -> None:
-    link, body = f"/v1/meshes/{apart}/locate", {"points": [[0, 0, 0]]}
-    for response in (
-        locate(client, apart, NPY, **body),
-        locate(client, apart, {"Accept": "application/octet-stream"}, **body),
-        locate(client, apart, {"Accept": "text/html"}, **body),
-        client.post(f"{link}?format=npy", json=body),
-        client.post(f"{link}?format=octets", json=body),
-    ):
-        problem = check_problem(response, 406, "not_acceptable")
-        assert problem["detail"] == "this answer is available as application/json, text/csv"
-    for headers in ({"Accept": "*/*"}, {"Accept": "application/x-npy, application/json;q=0.1"}):
-        assert locate(client, apart, headers, **body).status_code == 200
-    assert client.post(f"{link}?format=json", json=body).status_code == 200
-    check_problem(client.post(f"{link}?format=xml", json=body), 422, "invalid_request")
 
 
 def test_a_mesh_that_is_not_there(client: TestClient) -> None:

@@ -55,19 +55,6 @@ def test_paths_are_the_library_s(client: TestClient, knot: str, method: dict) ->
     assert (answer["paths"][2]["length"], len(answer["paths"][2]["points"])) == (0, 1)
 
 
-def test_lengths_are_those_of_single_paths(client: TestClient, knot: str) -> None:
-    lengths = [
-        client.post(
-            f"/v1/meshes/{knot}/path", json={"source": {"vertex": 3}, "target": target}
-        ).json()["length"]
-        for target in TARGETS
-    ]
-
-    found = [path["length"] for path in paths(client, knot).json()["paths"]]
-
-    assert found == pytest.approx(lengths, rel=1e-12)
-
-
 @pytest.mark.parametrize("method", METHODS, ids=["exact", "approximate"])
 def test_no_path_has_a_reason_of_its_own(client: TestClient, apart: str, method: dict) -> None:
     targets = [{"vertex": i} for i in (4, 1, 0)]

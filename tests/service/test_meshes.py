@@ -15,17 +15,17 @@ import pytest
 from nibabel.gifti import GiftiDataArray, GiftiImage
 from starlette.testclient import TestClient
 
+import geodesic_core as gc
 from app.cli.arguments import SampleName
 from app.schemas import meshes as schemas
 from app.settings import Settings
-from app.store.manifests import MANIFEST, encode_manifest, read_manifest
+from app.store.mesh_home import MeshHome
 from geodesic_core import samples
 from geodesic_core.io.load import _READERS
 from tests.support.service import (
     ServiceClient,
     check_problem,
     serving,
-    store_mesh,
     stored_mesh,
     upload_sample,
 )
@@ -147,6 +147,32 @@ def test_the_service_reads_what_the_library_reads(client: TestClient) -> None:
     assert client.get("/v1").json()["mesh_formats"] == [*formats, "json"]
 
 
+def test_a_surface_may_be_given_by_its_lengths(client: TestClient) -> None:
+    mesh, archive = gc.samples.plane(8), BytesIO()
+    corners = mesh.vertices[mesh.faces]
+    lengths = 3.0 * np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    np.savez(archive, faces=mesh.faces, lengths=lengths, vertices=mesh.vertices)
+    made = client.post("/v1/meshes", params={"format": "npz"}, content=archive.getvalue())
+    assert made.status_code == 201
+    plain = client.post("/v1/meshes", content=off_of(mesh), params={"format": "off"})
+    assert plain.json()["id"] != made.json()["id"]
+    answer = client.post(f"/v1/meshes/{made.json()['id']}/distances", json={"sources": [0]})
+    exact = 3.0 * gc.exact_distance(mesh, 0).distances
+    np.testing.assert_allclose(answer.json()["distances"], exact, atol=1e-12)
+
+    alone = BytesIO()
+    np.savez(alone, faces=mesh.faces, lengths=lengths)
+    refused = client.post("/v1/meshes", params={"format": "npz"}, content=alone.getvalue())
+    problem = check_problem(refused, 422, "invalid_mesh")
+    assert "has no vertices" in problem["detail"]
+
+
+def off_of(mesh: gc.TriangleMesh) -> str:
+    rows = [" ".join(map(repr, row)) for row in mesh.vertices.tolist()]
+    rows += [f"3 {a} {b} {c}" for a, b, c in mesh.faces.tolist()]
+    return "\n".join(["OFF", f"{len(mesh.vertices)} {len(mesh.faces)} 0", *rows, ""])
+
+
 @pytest.mark.parametrize(
     ("content", "code", "words"),
     [
@@ -171,7 +197,7 @@ def test_samples_have_the_same_names_everywhere(client: TestClient) -> None:
     names = list(samples.SAMPLES)
 
     assert list(get_args(schemas.SampleName)) == names
-    assert list(SampleName) == names, "the command line's"
+    assert list(get_args(SampleName)) == names, "the command line's"
     assert client.get("/v1").json()["samples"] == names
 
 
@@ -223,16 +249,6 @@ def test_the_name_of_a_mesh_comes_with_its_first_upload(
         assert listed.items() <= document.items()
 
 
-def test_a_mesh_that_an_earlier_release_stored_has_no_name(tmp_path: Path) -> None:
-    mesh_id = store_mesh(tmp_path, samples.plane(8))
-    path = tmp_path / "meshes" / mesh_id / MANIFEST
-    manifest = dict(read_manifest(str(path)))
-    del manifest["name"]
-    path.write_bytes(encode_manifest(manifest))
-    with serving(tmp_path) as client:
-        assert client.get(f"/v1/meshes/{mesh_id}").json()["name"] is None
-
-
 @pytest.mark.parametrize("name", ["", "x" * 256, "a\x1b[31mb", "a\x9bb", "a\n"])
 def test_names_that_are_refused(client: TestClient, name: str) -> None:
     response = client.post("/v1/meshes", params={"name": name}, json=TETRAHEDRON)
@@ -281,18 +297,6 @@ def test_what_is_no_way_of_merging(client: TestClient, merge: str) -> None:
     response = client.post("/v1/meshes", params={"merge": merge}, json=APART)
     problem = check_problem(response, 422, "invalid_request")
     assert {error["pointer"] for error in problem["errors"]} == {"/query/merge"}
-
-
-def test_a_mesh_of_an_earlier_release_has_no_report_of_seams(tmp_path: Path) -> None:
-    mesh_id = store_mesh(tmp_path, samples.plane(2))
-    path = tmp_path / "meshes" / mesh_id / MANIFEST
-    manifest = dict(read_manifest(str(path)))
-    new = ["near_vertices", "near_distance", "t_junctions", "t_junction_edges"]
-    manifest["report"] = {k: v for k, v in manifest["report"].items() if k not in new}
-    path.write_bytes(encode_manifest(manifest))
-    with serving(tmp_path) as client:
-        document = client.get(f"/v1/meshes/{mesh_id}").json()
-    assert [document[name] for name in new] == [None] * 4
 
 
 QUADS = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv 1 9 0\nf 1 2 3 4\nf 1 1 2\nf 4 3 5\nl 1 2"
@@ -744,31 +748,18 @@ def test_a_damaged_mesh_does_not_hide_the_others(tmp_path: Path) -> None:
         check_problem(client.get(f"/v1/meshes/{damaged}"), 500, "mesh_damaged")
 
 
-def test_damage_is_reported(tmp_path: Path) -> None:
-    with serving(tmp_path) as client:
-        mesh_id = upload_sample(client, "plane", 100)
-        array = tmp_path / "meshes" / mesh_id / "vertices.npy"
-        array.write_bytes(array.read_bytes()[:-1] + b"!")
-
-        query = {"sources": [{"vertex": 0}]}
-        response = client.post(f"/v1/meshes/{mesh_id}/distances", json=query)
-
-        problem = check_problem(response, 500, "mesh_damaged")
-        assert "vertices" in problem["detail"]
-        assert "upload it again" in problem["hint"]
-
-
 def test_a_list_reads_its_manifests_beside_the_event_loop(
     client: ServiceClient, plane: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A thousand of them are a thousand files."""
     readers: set[int] = set()
+    read = MeshHome._readable
 
-    def noted(path: str) -> Any:
+    def noted(home: MeshHome, mesh_id: str) -> Any:
         readers.add(threading.get_ident())
-        return read_manifest(path)
+        return read(home, mesh_id)
 
-    monkeypatch.setattr("app.store.meshes.manifest_of", noted)
+    monkeypatch.setattr(MeshHome, "_readable", noted)
     listed = client.get("/v1/meshes", params={"limit": 1000}).json()["meshes"]
     assert plane in {mesh["id"] for mesh in listed}
     assert readers

@@ -70,14 +70,6 @@ def test_why_there_are_fewer(client: TestClient, apart: str) -> None:
     assert none["unreachable"] == {"disconnected": 1, "beyond_max_distance": 0}
 
 
-@pytest.mark.usefixtures("one_replica")
-def test_the_same_question_is_not_solved_again(client: TestClient, knot: str) -> None:
-    first, again = (nearest(client, knot, k=7) for _ in range(2))
-
-    assert (again.content, again.headers["server-timing"]) == (first.content, "kept")
-    assert nearest(client, knot, k=6).headers["etag"] != first.headers["etag"]
-
-
 @pytest.mark.parametrize(
     ("change", "place"),
     [

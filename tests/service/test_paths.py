@@ -9,10 +9,7 @@ import pytest
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
-from app.queries import PathQuery, result_key
 from app.schemas.answers import StepName
-from app.schemas.points import VertexPoint
-from app.schemas.requests import PathRequest
 from tests.support.service import NPY, check_problem, serving, stored_mesh, upload_sample
 
 ENDS = {"source": {"vertex": 0}, "target": {"vertex": 60}}
@@ -154,24 +151,6 @@ def test_no_path_to_a_waypoint(client: TestClient, apart: str) -> None:
     answer = client.get(f"/v1/meshes/{apart}/path?from=v0&to=v1&via=v4").json()
 
     assert (answer["status"], answer["reason"]) == ("no_path", "disconnected")
-
-
-def test_each_route_has_a_result_of_its_own() -> None:
-    routes = [(), (3,), (4,), (3, 4), (4, 3)]
-    first, last = VertexPoint(vertex=0), VertexPoint(vertex=9)
-    queries = [
-        PathQuery(
-            "m",
-            PathRequest(
-                source=first,
-                target=last,
-                waypoints=[VertexPoint(vertex=i) for i in route],
-            ),
-        )
-        for route in routes
-    ]
-
-    assert len({result_key(query) for query in queries}) == len(routes)
 
 
 def test_waypoints_are_limited(tmp_path: Path) -> None:

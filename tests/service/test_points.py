@@ -18,9 +18,8 @@ from app.queries import (
     PathQuery,
     PathsQuery,
     Query,
-    result_key,
 )
-from app.schemas.points import FacePoint, VertexPoint, VertexSource
+from app.schemas.points import VertexPoint, VertexSource
 from app.schemas.requests import (
     DistancesRequest,
     LocateRequest,
@@ -142,17 +141,6 @@ def test_distances_are_the_library_s(
     ]
     assert answered["targets"] == [echo(mesh, target) for target in targets]
     assert answered["unreachable"] == {"disconnected": 0, "beyond_max_distance": 0}
-
-
-def test_distances_of_all_vertices_from_a_point(
-    client: TestClient, knot: str, mesh: gc.TriangleMesh
-) -> None:
-    field = gc.exact_distance(mesh, gc.SurfacePoint.face(40, (0.2, 0.3, 0.5)))
-
-    answered = distances(client, knot, sources=[INSIDE]).json()
-
-    np.testing.assert_array_equal(answered["distances"], field.distances)
-    assert "targets" not in answered
 
 
 @pytest.mark.parametrize("method", METHODS, ids=["exact", "approximate"])
@@ -315,23 +303,6 @@ def test_what_is_out_of_reach(client: TestClient, apart: str) -> None:
     no_path = get_path(client, apart, text_of(inside[0]), text_of(inside[1])).json()
     assert (no_path["status"], no_path["reason"]) == ("no_path", "disconnected")
     assert no_path["source"]["face"] == 0
-
-
-def test_keys_tell_points_apart() -> None:
-    points = [
-        VertexPoint(vertex=1),
-        VertexPoint(vertex=2),
-        FacePoint(face=1, barycentric=(1, 0, 0)),
-        FacePoint(face=1, barycentric=(0, 1, 0)),
-    ]
-    paths = [PathRequest(source=points[0], target=target) for target in points]
-    paths += [PathRequest(source=target, target=points[0]) for target in points[1:]]
-    queries: list[Query[Any]] = [PathQuery("m", path) for path in paths]
-    for position, limit in (((0, 0, 0), None), ((0, 0, 0), 1.0), ((0, 0, 1), None)):
-        queries.append(LocateQuery("m", LocateRequest(points=[position], max_distance=limit)))
-    queries.append(PathQuery("n", paths[0]))
-
-    assert len({result_key(query) for query in queries}) == len(queries)
 
 
 def test_looking_for_points_can_be_stopped() -> None:

@@ -63,6 +63,7 @@ def test_the_database_of_jobs_cannot_be_written_for_a_while(tmp_path: Path) -> N
                 check_problem(server.client.delete(done), 507, "storage_full")
                 assert server.client.get(f"{done}/results").status_code == 200
                 check_problem(server.client.post(f"{running}/cancel"), 507, "storage_full")
+                assert get(running) == "accepted"
                 assert not read_jobs(database)[1].is_finished
             assert server.client.post(f"{running}/cancel").json()["status"] == "dismissed"
         assert submit(server, mesh_id, 2).status_code == 202

@@ -5,6 +5,7 @@ import socket
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from functools import partial
 from http.client import HTTPResponse
 from threading import Event, Thread
 from typing import Any, cast
@@ -14,7 +15,6 @@ import uvicorn
 
 from app.http.connections import Connections
 from app.http.protocol import BoundedHttpProtocol
-from app.http.reading import PacedReading
 from app.settings import Settings
 from tests.support.waiting import LONG_S, wait_until
 
@@ -28,38 +28,15 @@ class Listener:
     parsed_bytes: list[int] = field(default_factory=list)
     drained_bytes: list[int] = field(default_factory=list)
     """What came after a refusal"""
-    parsed_chunks: list[int] = field(default_factory=list)
-    turns: list[int] = field(default_factory=list)
-    """For each read, how often the event loop had gone round, once it is counted"""
-    held_bytes: list[int] = field(default_factory=list)
-    """For each read, the bytes of a body that the application had not taken after it"""
     bodies: list[bytes] = field(default_factory=list)
     disconnects: list[str] = field(default_factory=list)
     gate: asyncio.Event = field(default_factory=asyncio.Event)
     """Requests of ``/gate`` are answered once it is set; bodies of ``/later`` are read then."""
     loop: asyncio.AbstractEventLoop | None = None
-    turn: int = 0
 
     def open_gate(self) -> None:
         assert self.loop is not None
         self.loop.call_soon_threadsafe(self.gate.set)
-
-    @contextmanager
-    def counting_turns(self) -> Iterator[None]:
-        """Count how often the event loop goes round, inside the block."""
-        assert self.loop is not None
-        loop, over = self.loop, Event()
-
-        def count() -> None:
-            self.turn += 1
-            if not over.is_set():
-                loop.call_soon(count)
-
-        loop.call_soon_threadsafe(count)
-        try:
-            yield
-        finally:
-            over.set()
 
     @contextmanager
     def paused(self) -> Iterator[None]:
@@ -144,21 +121,12 @@ def listening(settings: Settings) -> Iterator[Listener]:
     class Counted(BoundedHttpProtocol):
         """The protocol, which counts what reaches its parser."""
 
-        def data_received(self, data: bytes | memoryview) -> None:
-            if self._is_refused:
-                listener.drained_bytes.append(len(data))
-                super().data_received(data)
-                return
-            listener.parsed_bytes.append(len(data))
-            listener.turns.append(listener.turn)
+        def data_received(self, data: bytes) -> None:
+            counted = listener.drained_bytes if self._is_refused else listener.parsed_bytes
+            counted.append(len(data))
             super().data_received(data)
-            listener.parsed_chunks.append(self.chunks_of_read)
-            listener.held_bytes.append(len(self.cycle.body) if self.cycle else 0)
 
-    connections = Connections(settings)
-
-    def connect(**arguments: Any) -> PacedReading:
-        return PacedReading(Counted(connections=connections, **arguments))
+    connect = partial(Counted, connections=Connections(settings))
 
     with socket.create_server(("127.0.0.1", 0)) as server_socket:
         config = uvicorn.Config(

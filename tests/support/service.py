@@ -18,11 +18,10 @@ from app.main import create_app
 from app.queries import ExecutionContext, FieldCache
 from app.settings import Settings
 from app.store.fields import FieldStore
-from app.store.folder_meshes import FolderMeshes
 from app.store.mesh_catalog import MeshCatalog
 from app.store.meshes import MeshStore
-from app.store.ownership import owned
 from app.store.scratch import Scratch
+from app.store.store import Store
 from geodesic_core.fields.fast_sweep import FastSweep
 from geodesic_core.fields.sweeps import WholeSweep
 from tests.support.against import ClusterClient, is_against_cluster, serving_cluster
@@ -132,7 +131,8 @@ async def scratch_folder(store: MeshStore) -> AsyncIterator[Path]:
 def store_mesh(root: Path, mesh: gc.TriangleMesh, owner: str | None = None) -> str:
     """Put a mesh into a store on which no service runs."""
     store = MeshStore(root)
-    catalog = MeshCatalog(FolderMeshes(root), 2**60, evicts=False)
+    own = Store(root)
+    catalog = MeshCatalog(own.meshes, 2**60, evicts=False)
 
     async def add() -> str:
         async with scratch_folder(store) as folder:
@@ -140,7 +140,7 @@ def store_mesh(root: Path, mesh: gc.TriangleMesh, owner: str | None = None) -> s
             await catalog.add(written)
             return written.mesh_id
 
-    with owned(root):
+    with own.owned():
         catalog.prepare()
         return anyio.run(add)
 

@@ -5,17 +5,17 @@ import re
 from uuid import uuid4
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.middleware.body_limit import MAX_BODY_SIZE_SCOPE_KEY
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from structlog.contextvars import bound_contextvars
 
 from app.errors import PROBLEM_JSON, Problem, draining, problem_of_status
 from app.http.failures import CLIENT_CLOSED, note_failure
-from app.http.prefix import prefix_of
+from app.http.prefix import path_in, prefix_of
 from app.http.responses import common_headers, problem_response
 from app.settings import Settings
 from app.tracing import trace_fields
 
+_UPLOADS = "/v1/meshes"
 _SANE_ID = re.compile(r"[\w.:-]{1,128}")
 
 
@@ -83,10 +83,9 @@ def _is_plain_error(status: int, headers: Headers) -> bool:
 
 
 def body_too_large(scope: Scope, settings: Settings) -> Problem:
-    """Return the problem for a body above the limit that Starlette noted in ``scope``."""
-    limit = scope[MAX_BODY_SIZE_SCOPE_KEY]
-    is_upload = limit == settings.max_upload_bytes
-    setting = "max_upload_bytes" if is_upload else "max_query_bytes"
+    """Return the problem for a body above the limit of its route."""
+    setting = "max_upload_bytes" if path_in(scope) == _UPLOADS else "max_query_bytes"
+    limit = getattr(settings, setting)
     declared = Headers(scope=scope).get("content-length", "")
     return Problem(
         "upload_too_large",

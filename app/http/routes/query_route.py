@@ -1,66 +1,154 @@
-"""The route class of queries: FastAPI documents them, and one pydantic model reads a request.
+"""The route of a query: one model reads headers, query string and body, and an answer is sent.
 
-FastAPI works out the kinds of parameters anew for each request, which took a fifth of the time of a
-small one. So each route has one model for headers, parameters and body, made once.
+FastAPI documents these routes. By itself it would work out the kinds of their parameters anew for
+each request, which took a fifth of the time of a small one.
 """
 
 from collections.abc import Callable, Coroutine
 from functools import partial
-from typing import Any, get_origin
+from typing import Annotated, Any, get_origin, get_type_hints
 
-from fastapi import Request, Response
+from fastapi import Header, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
-from pydantic import BaseModel, ValidationError, create_model
+from pydantic import BaseModel, Field, ValidationError, create_model
+from pydantic_core import from_json
 
-from app.http.dependencies import require_json, service_of
-from app.http.large_bodies import large_bodies_of
-from app.http.routes.query_request import (
-    QueryHeaders,
-    get_answer,
-    parse_json,
+from app.errors import over_limit, problem
+from app.http.dependencies import (
+    TimeoutHeader,
+    context_of,
+    job_after,
+    negotiated,
+    note_work,
+    refuse_idempotency_key,
+    require_json,
+    service_of,
+    while_connected,
 )
-from app.queries import check_lengths
+from app.http.large_bodies import LARGE, large_bodies_of
+from app.http.prefix import prefix_of
+from app.http.responses import (
+    CACHED,
+    NEGOTIATED,
+    UNSTORED,
+    accepted_response,
+    etag_of,
+    not_modified,
+    result_response,
+)
+from app.jobs import Job
+from app.queries import Query, check_lengths, result_key
+from app.schemas.requests import AnswerParameters
+from app.service.answering import Answered
 from app.settings import Settings
+
+_PARTS = "header", "query", "body"
+"""Parameters of a handler, each a model; problems name them as the beginning of a place"""
+_LEAST_BYTES_OF_VALUE = 7
+"""Bytes a value for a body that is full: indices of six digits. To parse denser ones takes long."""
+
+
+class _QueryHeaders(TimeoutHeader):
+    """The headers of a request for a query."""
+
+    prefer: str | None = Field(
+        default=None,
+        description=(
+            "`respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only "
+            "if the answer is not ready after two seconds"
+        ),
+    )
+    idempotency_key: str | None = Field(
+        default=None,
+        alias="idempotency-key",
+        min_length=1,
+        max_length=255,
+        description="Freely chosen key of a job: a request that is sent again with the same key "
+        "gets the same job. With `Prefer: respond-async` only",
+    )
+
+
+QueryHeaders = Annotated[_QueryHeaders, Header()]
 
 
 class QueryRoute(APIRoute):
-    """A route whose handler takes ``answer``, ``parameters`` and, unless ``GET``, ``body``.
+    """A route whose handler takes a mesh id, the request, and the models of what the request has.
 
-    The latter two are models.
+    These are ``header``, ``query`` and, unless it is a ``GET``, ``body``.
     """
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """Return the function that reads a request and calls the handler."""
-        takes_body = self.body_field is not None
-        parameters: Any = self.dependant.query_params[0].field_info.annotation
-        parts: dict[str, Any] = {"header": (QueryHeaders, ...), "query": (parameters, ...)}
-        if self.body_field is not None:
-            parts["body"] = (self.body_field.field_info.annotation, ...)
+        kinds = get_type_hints(self.endpoint)
+        parts: dict[str, Any] = {name: (kinds[name], ...) for name in _PARTS if name in kinds}
         model = create_model("Request", **parts)
-        lists = _lists_of(parameters)
+        lists = _lists_of(kinds["query"])
 
-        async def answer(request: Request) -> Response:
-            if takes_body:
-                require_json(request)
+        async def respond(request: Request) -> Response:
+            settings, body = service_of(request).settings, b""
             head = {"header": _headers(request), "query": _parameters(request, lists)}
-            settings = service_of(request).settings
-            if takes_body:
+            if "body" not in parts:
+                whole = read(model, head, body, settings)
+            else:
+                require_json(request)
                 large, deadline_s = large_bodies_of(request), settings.deadline_s
                 async with large.reading(request, deadline_s):
                     reading = partial(read, model, head, await request.body(), settings)
                     whole = await large.check(request, deadline_s, reading)
-            else:
-                whole = read(model, head, b"", settings)
             mesh_id = request.path_params["mesh_id"]
-            response: Response = await self.endpoint(
-                answer=await get_answer(mesh_id, request, whole.header),
-                parameters=whole.query,
-                **({"body": whole.body} if takes_body else {}),
-            )
+            response: Response = await self.endpoint(mesh_id, request, **vars(whole))
             return response
 
-        return answer
+        return respond
+
+
+async def answer(
+    kind: type[Query[Any]],
+    mesh_id: str,
+    request: Request,
+    preferences: _QueryHeaders,
+    parameters: AnswerParameters,
+    body: Any,
+) -> Response:
+    """Check the query of a kind in a body, and respond with its answer or a job."""
+    service, context = service_of(request), context_of(request, preferences)
+    wait_s, key = job_after(preferences.prefer), preferences.idempotency_key
+    if wait_s is None:
+        refuse_idempotency_key(request)
+    size = await service.size(mesh_id)
+
+    def make_query() -> Query[Any]:
+        query = kind.ask(mesh_id, size, body, service.settings)
+        query = query.answered_as(negotiated(request, parameters, query.offers))
+        query.written  # noqa: B018 - computes and caches it
+        return query
+
+    query = await large_bodies_of(request).check(request, context.deadline_s, make_query)
+    if wait_s == 0:
+        job = await service.query_jobs.submit(query, context, key)
+        return accepted_response(job, prefix_of(request.scope))
+    is_cacheable = request.method == "GET"
+    headers = {**NEGOTIATED, **(CACHED if is_cacheable else UNSTORED)}
+    if is_cacheable:
+        unchanged = not_modified(request, etag_of(result_key(query)), headers)
+        if unchanged is not None:
+            return unchanged
+    as_file = "range" in request.headers
+    answering: Coroutine[Any, Any, Answered | Job]
+    if wait_s is None:
+        answering = service.answering.answer(query, context, as_file=as_file)
+    else:
+        answering = service.query_jobs.answer_or_submit(
+            query, context, wait_s, key, as_file=as_file
+        )
+    answered = await while_connected(request, answering)
+    if isinstance(answered, Job):
+        return accepted_response(answered, prefix_of(request.scope))
+    result, seconds = answered
+    note_work(request, mesh_id, seconds)
+    media_type = query.representation.media_type
+    return result_response(request, result, seconds, media_type, service.results, headers)
 
 
 def read(model: type[BaseModel], head: dict[str, Any], body: bytes, settings: Settings) -> Any:
@@ -81,6 +169,22 @@ def read(model: type[BaseModel], head: dict[str, Any], body: bytes, settings: Se
         return model.model_validate(head)
     except ValidationError as error:
         raise RequestValidationError(error.errors(include_url=False)) from None
+
+
+def parse_json(body: bytes, settings: Settings) -> Any:
+    """Return the value of a JSON body, or refuse the body.
+
+    The parser stops everything else, so that values are counted before, by their commas.
+    """
+    most = max(settings.max_query_bytes // _LEAST_BYTES_OF_VALUE, LARGE)
+    values = body.count(b",") + 1
+    if values > most:
+        raise over_limit("limit_exceeded", "values in the body", values, most, "max_query_bytes")
+    try:
+        return from_json(body)
+    except ValueError as error:
+        code = "invalid_request" if "number out of range" in str(error) else "malformed_body"
+        raise problem(code, f"the body cannot be read as JSON: {error}") from None
 
 
 def _headers(request: Request) -> dict[str, str]:

@@ -87,6 +87,8 @@ class Bounds(NamedTuple):
     directed: tuple[int, ...] = ()
     """Empty unless the windows of an exact sweep carry directions; by its length, as above. Two
     where edges have several faces, so that frames are seen in the mirror: that costs 3 % more"""
+    directed_from_bends: bool = False
+    """Whether windows that leave a bend carry directions there, as those from sources do"""
 
 
 def exact_bounds(max_distance: float, pruning: PruningBounds = NO_PRUNING) -> Bounds:
@@ -109,9 +111,9 @@ def without_merging(bounds: Bounds) -> Bounds:
     return bounds._replace(merging=())
 
 
-def with_directions(bounds: Bounds, mirrors: bool) -> Bounds:
+def with_directions(bounds: Bounds, mirrors: bool, from_bends: bool) -> Bounds:
     """Return the bounds of the same exact sweep whose windows carry directions."""
-    return bounds._replace(directed=(1, 1) if mirrors else (1,))
+    return bounds._replace(directed=(1, 1) if mirrors else (1,), directed_from_bends=from_bends)
 
 
 def with_parallel_windows(bounds: Bounds, first_segment: int) -> Bounds:

@@ -8,7 +8,8 @@ The *turn* of a half-edge is the angle of its x axis in the frame of the source,
 window. A ray at polar angle φ leaves the source at turn + φ, or at turn - φ where the half-edge is
 seen in the mirror. A turn is right as it is, not modulo 2π: the fan of a vertex may have another
 total angle. Windows lit by a source itself have a turn. Behind a bend all rays leave the source as
-the path to the bend does, which predecessors tell after the sweep.
+the path to the bend does, which predecessors tell after the sweep. To carry a vector through a
+bend, the sweep gives windows from there a turn as well, in the frame of the bend.
 """
 
 import math
@@ -151,8 +152,38 @@ def angles_at_sources(topology: Topology, vertices: Vertices, sites: Sites) -> t
 
 
 @kernel
+def angles_of_legs(topology: Topology, vertices: Vertices, sites: Sites) -> tuple[Floats, Floats]:
+    """Return the angles at both ends of the straight last leg of the path to each vertex.
+
+    (N,) radians by node, at which the leg leaves its source or bend, and at which it is seen from
+    the vertex; NaN where unreached, and at sources. The sweep carries directions from bends. O(N).
+    """
+    count = len(vertices.distance)
+    leaving, arriving = np.full(count, np.nan), np.full(count, np.nan)
+    for v in range(len(topology.total_angle)):
+        if vertices.distance[v] < math.inf and vertices.winner_ints[v, ENTRY_EDGE] >= 0:
+            leaving[v] = straight_angle(topology, vertices, sites, v)
+            arriving[v] = angle_back(topology, vertices, v)
+    return leaving, arriving
+
+
+@kernel
+def angle_back(topology: Topology, vertices: Vertices, v: int) -> float:
+    """Return the angle, in the fan of vertex v, of the way back along the path that reached it."""
+    geometry, h = topology.geometry, vertices.winner_ints[v, ENTRY_EDGE]  # v is its apex
+    ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
+    ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
+    dx, dy = ax - vertices.winner[v, 0], ay - vertices.winner[v, 1]
+    turn = math.atan2(ax * dy - ay * dx, ax * dx + ay * dy)
+    return float(geometry[h, APEX_ANGLE]) + max(turn, 0.0)
+
+
+@kernel
 def straight_angle(topology: Topology, vertices: Vertices, sites: Sites, v: int) -> float:
-    """Return the angle at which the path to node v, which never bends, leaves its source."""
+    """Return the angle at which the last leg of the path to node v leaves its predecessor.
+
+    That is a source, or a bend if the sweep carries directions from there.
+    """
     geometry, site_rows = pointers(topology.geometry), pointers(sites)
     h, source = vertices.winner_ints[v, ENTRY_EDGE], vertices.winner_ints[v, PREDECESSOR]
     x = geometry[ROW * h + COS_LEFT] * geometry[ROW * h + LENGTH_LEFT]

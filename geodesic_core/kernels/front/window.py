@@ -19,7 +19,7 @@ reference      reference list (4.3)     what was merged into it: a merge's index
                                         (a slot), or < 0: see `irregular_edges`
 turn                                    in a directed sweep, of a window lit by a source itself:
                                         angle of the half-edge in the frame of the source, radians,
-                                        see `directions`; else NaN
+                                        see `directions`; else NaN, unless bends have frames, too
 mirrored                                in a directed sweep, whether that frame is seen in the
                                         mirror: 1 or 0
 =============  =======================  =========================================================

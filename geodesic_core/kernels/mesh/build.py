@@ -1,7 +1,8 @@
 """Construction of the half-edge structure from vertices and faces, in one pass.
 
 Vertices are renumbered along a Morton curve, and faces by their lowest vertex. What is near on the
-surface is then near in memory, which makes the sweep 5 to 20 % faster on scanned meshes.
+surface is then near in memory, which makes the sweep 5 to 20 % faster on scanned meshes. Where the
+surface is given by its lengths, vertices are renumbered breadth first instead.
 """
 
 import math
@@ -147,7 +148,36 @@ def counting_sort(keys: Ints, key_count: int, order: Ints, sorted_order: Ints) -
 
 
 @kernel
+def breadth_first_codes(faces: Ints, vertex_count: int) -> Ints:
+    """Return the order in which a search over the faces finds each vertex; O(V + F)."""
+    flat = faces.reshape(-1)
+    order, first = np.empty(len(flat), np.int32), np.zeros(vertex_count + 1, np.int32)
+    counting_sort(flat, vertex_count, first_integers(len(flat)), order)
+    for h in range(len(flat)):
+        first[flat[h] + 1] += 1
+    for v in range(vertex_count):
+        first[v + 1] += first[v]
+    codes, found, count = np.full(vertex_count, -1, np.int32), np.empty(vertex_count, np.int32), 0
+    for start in range(vertex_count):
+        if codes[start] >= 0:
+            continue
+        codes[start], found[count], done = count, start, count
+        count += 1
+        while done < count:
+            v = found[done]
+            done += 1
+            for i in range(first[v], first[v + 1]):
+                for k in range(3):
+                    w = faces[order[i] // 3, k]
+                    if codes[w] < 0:
+                        codes[w], found[count] = count, w
+                        count += 1
+    return codes
+
+
+@kernel
 def renumber(
+    codes: Ints,
     vertices: Floats,
     faces: Ints,
     inner_vertex: Ints,
@@ -155,8 +185,10 @@ def renumber(
     outer_face: Ints,
     positions: Floats,
 ) -> Ints:
-    """Fill the three maps and ``positions``; return the faces in inner numbering; O(V + F)."""
-    codes = morton_codes(vertices)
+    """Fill the three maps and ``positions``; return the faces in inner numbering; O(V + F).
+
+    Vertices are sorted by their codes.
+    """
     digits = np.empty(len(vertices), np.int32)
     order = first_integers(len(vertices))
     for shift in range(0, 3 * _MORTON_BITS, _RADIX_BITS):
@@ -302,13 +334,55 @@ def fill_geometry(
             angles[h] = angle_of(dot / norm, cross / norm)
             if cross <= NO_AREA * norm:
                 pinched[f] = 1
+        fill_right(geometry, f)
+    return -1
+
+
+@kernel
+def fill_right(geometry: Floats, f: int) -> None:
+    """Fill the other lengths and angles of a face from those at its half-edges' tails."""
+    for i in range(3):
+        h, n, p = 3 * f + i, 3 * f + (i + 1) % 3, 3 * f + (i + 2) % 3
+        geometry[h, LENGTH_LEFT] = geometry[p, LENGTH]
+        geometry[h, LENGTH_RIGHT] = geometry[n, LENGTH]
+        geometry[h, COS_RIGHT] = geometry[n, COS_LEFT]
+        geometry[h, SIN_RIGHT] = geometry[n, SIN_LEFT]
+
+
+@kernel
+def fill_geometry_by_lengths(
+    lengths: Floats, faces: Ints, geometry: Floats, angles: Floats, pinched: Flags
+) -> None:
+    """Fill the same from the lengths of the half-edges, (3 F,)."""
+    for f in range(faces.shape[0]):
         for i in range(3):
             h, n, p = 3 * f + i, 3 * f + (i + 1) % 3, 3 * f + (i + 2) % 3
-            geometry[h, LENGTH_LEFT] = geometry[p, LENGTH]
-            geometry[h, LENGTH_RIGHT] = geometry[n, LENGTH]
-            geometry[h, COS_RIGHT] = geometry[n, COS_LEFT]
-            geometry[h, SIN_RIGHT] = geometry[n, SIN_LEFT]
-    return -1
+            cosine, sine = angle_by_lengths(lengths[h], lengths[p], lengths[n])
+            geometry[h, LENGTH], geometry[h, COS_LEFT], geometry[h, SIN_LEFT] = (
+                lengths[h],
+                cosine,
+                sine,
+            )
+            angles[h] = angle_of(cosine, sine)
+            if sine <= NO_AREA:
+                pinched[f] = 1
+        fill_right(geometry, f)
+
+
+@kernel
+def angle_by_lengths(a: float, b: float, across: float) -> tuple[float, float]:
+    """Return cosine and sine of the angle between two sides of a triangle.
+
+    From products of differences in which nothing is lost on slivers: W. Kahan, *Miscalculating Area
+    and Angles of a Needle-like Triangle*, 2014. A third side that rounding has made longer than
+    both together counts as that long.
+    """
+    a, b = max(a, b), min(a, b)
+    beyond = across - (a - b) if b >= across else b - (a - across)
+    tangent = max(((a - b) + across) * beyond, 0.0)
+    base = max((a + (b + across)) * ((a - across) + b), 0.0)
+    norm = tangent + base
+    return (base - tangent) / norm, 2.0 * math.sqrt(tangent) * math.sqrt(base) / norm
 
 
 @kernel
@@ -473,6 +547,7 @@ def build_topology(vertices: Floats, faces: Ints, embedding: Any) -> tuple[Outco
     """Fill the arrays of ``embedding`` in O(V + F); return (outcome, inner face at fault)."""
     topology, positions = embedding
     inner_faces = renumber(
+        morton_codes(vertices),
         vertices,
         faces,
         topology.inner_vertex,
@@ -490,6 +565,48 @@ def build_topology(vertices: Floats, faces: Ints, embedding: Any) -> tuple[Outco
     fill_links(inner_faces, opposite, across, around, topology.links)
     label_components(faces, topology.component)
     return Outcome.FINISHED, -1
+
+
+@kernel
+def build_by_lengths(vertices: Floats, faces: Ints, lengths: Floats, embedding: Any) -> None:
+    """Fill the arrays of ``embedding`` in O(V + F) from lengths of edges, (F, 3).
+
+    Length i of a face is that from its corner i to the next. Positions are carried along.
+    """
+    topology, positions = embedding
+    inner_faces = renumber(
+        breadth_first_codes(faces, len(vertices)),
+        vertices,
+        faces,
+        topology.inner_vertex,
+        topology.outer_vertex,
+        topology.outer_face,
+        positions,
+    )
+    opposite, around = link_opposites(inner_faces, len(vertices))
+    angles, pinched = np.empty(len(opposite)), np.zeros(len(inner_faces), np.uint8)
+    own = lengths_of_half_edges(faces, lengths, inner_faces, topology)
+    fill_geometry_by_lengths(own, inner_faces, topology.geometry, angles, pinched)
+    unfold_fans(inner_faces, opposite, angles, pinched, topology)
+    across = crossings(inner_faces, opposite, pinched, topology.flags)
+    fill_links(inner_faces, opposite, across, around, topology.links)
+    label_components(faces, topology.component)
+
+
+@kernel
+def lengths_of_half_edges(faces: Ints, lengths: Floats, inner_faces: Ints, topology: Any) -> Floats:
+    """Return the length of each half-edge, (3 F,): faces were renumbered, and some turned over."""
+    own = np.empty(3 * len(faces))
+    for f in range(len(faces)):
+        outer = topology.outer_face[f]
+        for i in range(3):
+            tail, head = inner_faces[f, i], inner_faces[f, (i + 1) % 3]
+            for k in range(3):
+                start = topology.inner_vertex[faces[outer, k]]
+                end = topology.inner_vertex[faces[outer, (k + 1) % 3]]
+                if (start == tail and end == head) or (start == head and end == tail):
+                    own[3 * f + i] = lengths[outer, k]
+    return own
 
 
 def empty_embedding(vertex_count: int, face_count: int) -> Embedding:

@@ -475,11 +475,12 @@ def is_too_far(view: View, line: Line, walk: Walk, sight: Sight) -> bool:
     """Whether a line through this face contradicts a distance.
 
     It is longer than the distance of its end, or a shorter way to the apex than the apex's distance
-    allows.
+    allows. An apex beyond the limit of the sweep has none.
     """
     if walk.walked + sight.distance > line.length + line.slack:
         return True
-    return view.winners.vertices.distance[sight.apex] > sight.distance + sight.to_apex + line.slack
+    known = view.winners.vertices.distance[sight.apex]
+    return known < math.inf and known > sight.distance + sight.to_apex + line.slack
 
 
 @kernel

@@ -195,8 +195,10 @@ def emit_sector(wave: View, v: int, h: int, lo: float, hi: float, widest: float)
     if merging(wave):
         xi = vertices.upper[v] - sigma
     window = emitted_window(wave, b0, b1, sx, sy, sigma, v, xi)
-    if directed(wave) and vertices.winner_ints[WINNER * v + ENTRY_EDGE] < 0:
-        window = turned(window, turn_across_face(mesh.geometry, h), 0)
+    if directed(wave):
+        is_source = vertices.winner_ints[WINNER * v + ENTRY_EDGE] < 0
+        if is_source or wave.bounds.directed_from_bends:
+            window = turned(window, turn_across_face(mesh.geometry, h), 0)
     send_out(wave, across, following(h), window)
 
 

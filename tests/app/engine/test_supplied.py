@@ -18,12 +18,11 @@ from app.engine.supplied import SuppliedEngine
 from app.engine.work import RunQuery, Task, TaskResult
 from app.errors import StoreUnavailableError
 from app.service.progress import ignore_progress
+from app.store.bucket import Bucket
+from app.store.bucket_store import BucketStore
 from app.store.layout import RESULTS, TEMPORARY
 from app.store.meshes import MeshStore
-from app.store.object_results import ObjectResults
-from app.store.object_store import ObjectStore
-from app.store.objects import Objects
-from app.store.results import ResultStore
+from app.store.results import ResultFiles, ResultStore
 from geodesic_core import samples
 from tests.support.direct_engine import DirectEngine
 from tests.support.waiting import wait_until
@@ -54,13 +53,13 @@ class Machine:
 
 @asynccontextmanager
 async def machine_at(folder: Path) -> AsyncIterator[Machine]:
-    store = ObjectStore(Objects(MemoryStore()), folder, 10**9, "memory")
+    store = BucketStore(Bucket(MemoryStore()), folder, 10**9, "memory")
     with store.owned():
         written = MeshStore(folder).write_aside(
             samples.plane(50_000), folder / TEMPORARY / "mesh", None
         )
         assert await store.send_mesh(written)
-        await store.meshes.put(written, is_new=True)
+        await store.meshes.put(written)
         work = run_query(distances_query(written.mesh_id), NPY)
         inner = DirectEngine(new_worker(folder))
         results = ResultStore(store.results, 10**9, memory=0)
@@ -125,7 +124,7 @@ def test_a_result_counts_where_its_request_ends_while_it_is_sent(
     play: Play, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     writes: list[threading.Event] = []
-    write = Objects.write
+    write = Bucket.write
 
     def write_slowly(*arguments: Any) -> None:
         writes.append(may_go_on := threading.Event())
@@ -136,7 +135,7 @@ def test_a_result_counts_where_its_request_ends_while_it_is_sent(
         await anyio.to_thread.run_sync(wait_until, condition)
 
     async def scene(machine: Machine) -> None:
-        monkeypatch.setattr(Objects, "write", write_slowly)
+        monkeypatch.setattr(Bucket, "write", write_slowly)
         first = machine.ask()
         await until(lambda: len(writes) == 1)
         first.cancel()
@@ -160,7 +159,7 @@ def test_a_result_that_cannot_be_sent_is_removed(
         raise StoreUnavailableError("away")
 
     async def scene(machine: Machine) -> None:
-        monkeypatch.setattr(ObjectResults, "send", fail)
+        monkeypatch.setattr(ResultFiles, "write", fail)
         with pytest.raises(StoreUnavailableError):
             await machine.ask()
 

@@ -132,7 +132,7 @@ def test_many_addresses_take_bounded_memory_and_no_thread() -> None:
             refusal_of(limits, caller_number(n))
 
     assert memory[0] < 4_000_000
-    assert threading.active_count() == threads
+    assert threading.active_count() <= threads  # one of another test may end meanwhile
     remembered = [refusal_of(limits, caller_number(n)) is not None for n in range(14_999, -1, -1)]
     assert remembered == [True] * 10_000 + [False] * 5_000
 

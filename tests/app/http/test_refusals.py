@@ -11,7 +11,7 @@ from pydantic import BaseModel, TypeAdapter, ValidationError, create_model
 
 from app.errors import ProblemError
 from app.http import large_bodies
-from app.http.routes import query_request
+from app.http.routes import query_route
 from app.http.routes.query_route import read
 from app.queries import KINDS
 from app.schemas.points import Curve, CurveSource
@@ -115,7 +115,7 @@ def test_the_length_of_a_list_is_checked_before_its_elements(
 
 @pytest.mark.parametrize("count", [MOST_VALUES + 1, 2_000_000])
 def test_a_body_of_more_values_is_not_parsed(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(query_request, "from_json", None)
+    monkeypatch.setattr(query_route, "from_json", None)
     with pytest.raises(ProblemError) as refused:
         read(DISTANCES, {}, with_sources(count), SETTINGS)
     problem = refused.value.problem
@@ -127,7 +127,7 @@ def test_a_body_of_more_values_is_not_parsed(count: int, monkeypatch: pytest.Mon
 def test_a_body_of_64_kib_may_hold_any_number_of_values(most_bytes: int) -> None:
     settings = Settings(max_query_bytes=most_bytes)
     body = b"[" + b"1," * (2**15 - 2) + b"1]"
-    assert len(query_request.parse_json(body, settings)) == 2**15 - 1
+    assert len(query_route.parse_json(body, settings)) == 2**15 - 1
 
 
 @pytest.mark.parametrize("fails", [False, True])

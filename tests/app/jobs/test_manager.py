@@ -14,7 +14,8 @@ from app.jobs import Job, JobManager, JobRepository, JobRunner, Retention
 from app.jobs.runner import Solve
 from app.state import Database
 from app.state.schema import jobs as records
-from app.store.results import FolderResults, Result, ResultStore, write_result
+from app.store.folder import Folder
+from app.store.results import Result, ResultFiles, ResultStore, write_result
 from tests.support.jobs import SPEC, SlowSubmissions, new_job
 from tests.support.waiting import LONG_S
 
@@ -27,7 +28,7 @@ WITH_KEY = SPEC.model_copy(update={"idempotency_key": "a key"})
 
 def results_in(folder: Path) -> ResultStore:
     """Return a store with room for one of two answers of 60 bytes, ``m/one`` and ``m/two``."""
-    results = ResultStore(FolderResults(folder), 100, memory=0)
+    results = ResultStore(ResultFiles(Folder(folder)), 100, memory=0)
     results.prepare()
     return results
 
@@ -42,7 +43,7 @@ def has_room(results: ResultStore) -> bool:
 
 
 def answer(folder: Path, name: str = "m/one") -> Result:
-    return write_result(folder, name, [b"x" * 60], {}, "code", is_cheap=False)
+    return write_result(folder / "results", name, [b"x" * 60], {}, "code", is_cheap=False)
 
 
 async def fail(*_: object) -> NoReturn:

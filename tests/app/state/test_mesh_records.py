@@ -8,9 +8,9 @@ import pytest
 import geodesic_core as gc
 from app.errors import ProblemError
 from app.state import Database, MeshRecords
-from app.store.folder_meshes import FolderMeshes
 from app.store.mesh_catalog import CatalogChange, MeshCatalog
 from app.store.meshes import MeshStore
+from app.store.store import Store
 from tests.support.service import scratch_folder
 
 pytestmark = [
@@ -28,7 +28,7 @@ class Replica:
     ) -> None:
         self.store = MeshStore(root)
         self.catalog = MeshCatalog(
-            FolderMeshes(root),
+            Store(root).meshes,
             capacity,
             evicts=True,
             quota=quota,

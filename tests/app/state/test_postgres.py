@@ -13,8 +13,8 @@ from sqlalchemy import select
 from app.errors import StateUnavailableError, problem_of
 from app.state import Allowances, Database, MeshRecords, StateError
 from app.state.schema import HEAD
-from app.store.folder_meshes import FolderMeshes
 from app.store.mesh_catalog import MeshCatalog
+from app.store.store import Store
 from tests.support.paths import ROOT
 from tests.support.postgres import SECRET, Server
 
@@ -106,7 +106,7 @@ async def test_those_who_wait_for_the_meshes_leave_connections_to_others(
     url = postgres.new_database()
     ours, others = Database(NO_FILE, url), Database(NO_FILE, url)
     ours.prepare()
-    catalog = MeshCatalog(FolderMeshes(tmp_path), 2**30, evicts=True, shared=MeshRecords(ours))
+    catalog = MeshCatalog(Store(tmp_path).meshes, 2**30, evicts=True, shared=MeshRecords(ours))
 
     async def wait_for_meshes() -> None:
         with suppress(StateUnavailableError):  # it may take too long

@@ -14,15 +14,14 @@ from obstore.store import MemoryStore
 import geodesic_core as gc
 from app.errors import ProblemError
 from app.settings import Settings
+from app.store.bucket import Bucket
+from app.store.bucket_store import BucketStore
 from app.store.choice import store_of
-from app.store.folder_store import FolderStore
-from app.store.interface import Store
 from app.store.layout import RESULTS, TEMPORARY, StoreError
 from app.store.mesh_index import MeshIndex
 from app.store.meshes import MeshStore, WrittenMesh
-from app.store.object_store import ObjectStore
-from app.store.objects import Objects
 from app.store.results import SMALL, Result, write_result
+from app.store.store import Store
 from tests.support.waiting import LONG_S
 
 pytestmark = pytest.mark.file_slice(5)
@@ -50,8 +49,7 @@ class Machine:
     async def put(self, mesh: gc.TriangleMesh = MESH, owner: str | None = None) -> str:
         """Put a new mesh into the store; return its id."""
         written = await self.write(mesh, owner)
-        await self.store.meshes.settle(written)
-        await self.store.meshes.put(written, is_new=True)
+        await self.store.meshes.put(written)
         return written.mesh_id
 
     async def answer(self, name: str, body: bytes) -> Result:
@@ -67,7 +65,7 @@ class Machine:
 
     async def body(self, result: Result, start: int = 0) -> bytes:
         """Return the body of a result from an offset on."""
-        body = self.store.results.body(result)
+        body = self.store.results.body(result, lambda: None)
         if isinstance(body, Path):
             return body.read_bytes()[start:]
         assert body.size == result.manifest.size
@@ -98,8 +96,8 @@ def new_store(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[[Path]
     if kind == "folder":
         return lambda _folder: store_of(Settings(store=tmp_path / "shared"))
     if kind == "memory":
-        objects = Objects(MemoryStore())
-        return lambda folder: ObjectStore(objects, folder, 10**9, "memory")
+        objects = Bucket(MemoryStore())
+        return lambda folder: BucketStore(objects, folder, 10**9, "memory")
     url = request.getfixturevalue(kind).new_url()
     return lambda folder: store_of(Settings(store=url, copies=folder))
 
@@ -113,12 +111,9 @@ def machines(new_store: Callable[[Path], Store], tmp_path: Path) -> Iterator[Mac
             store = new_store(tmp_path / name)
             share = stack.enter_context(store.owned(is_shared=True))
             store.claim("a database")
-            if share is not None:
-                share.let_others_in()
+            share.let_others_in()
             folder = tmp_path / ("shared" if store.supply is None else name)
             (folder / TEMPORARY).mkdir(exist_ok=True)
-            (folder / RESULTS).mkdir(exist_ok=True)
-            store.meshes.found()
             found.append(Machine(store, folder))
         yield found[0], found[1]
 
@@ -165,7 +160,6 @@ async def test_a_mesh_that_is_not_there(machines: Machines, mesh_id: str) -> Non
         assert await meshes.record(mesh_id) is None
         assert not await meshes.is_intact(mesh_id)
         await meshes.remove(mesh_id)
-        await meshes.distrust(mesh_id)
     assert meshes.found() == {}
 
 
@@ -206,7 +200,7 @@ async def test_a_removed_mesh_is_gone_for_all_but_those_who_have_it_open(
     opened = np.load(await two.store.meshes.array_file(mesh_id, "vertices"), mmap_mode="r")
 
     await one.store.meshes.remove(mesh_id)
-    await two.store.meshes.distrust(mesh_id)  # it need not look again at once
+    two.store.meshes.distrust(mesh_id)  # it need not look again at once
     for machine in machines:
         assert await code_of(machine.store.meshes.manifest(mesh_id)) == "mesh_not_found"
         assert await code_of(machine.store.meshes.array_file(mesh_id, "faces")) == "mesh_not_found"
@@ -225,9 +219,11 @@ async def test_the_files_of_a_mesh_are_replaced(machines: Machines) -> None:
 
     written = await one.write(owner="bob")
     assert written.folder is not None, "it is not intact here"
-    await one.store.meshes.put(written, is_new=False)
+    await one.store.meshes.put(written)
     for machine in machines:
-        await machine.store.meshes.distrust(mesh_id)
+        if machine.store.supply is not None:
+            await machine.store.supply.drop_copy(mesh_id)
+        machine.store.meshes.distrust(mesh_id)
         assert await machine.store.meshes.is_intact(mesh_id)
         np.testing.assert_array_equal(await machine.array(mesh_id, "faces"), before)
         assert (await machine.store.meshes.manifest(mesh_id))["owner"] == "alice"
@@ -248,7 +244,7 @@ async def test_a_result_of_one_machine_is_read_by_the_other(machines: Machines, 
     assert await two.body(found) == content
     assert await two.body(found, size // 2) == content[size // 2 :]
     assert await two.store.results.size(written.name) == size
-    assert list(two.store.results.found(is_alone=True)) == [(written.name, size)]
+    assert list(two.store.results.found()) == [(written.name, size)]
 
 
 @pytest.mark.anyio
@@ -272,7 +268,7 @@ async def test_a_result_is_written_again(machines: Machines) -> None:
         found = await machine.store.results.read(name)
         assert found is not None
         assert found.body == await machine.body(found) == b"another"
-        assert list(machine.store.results.found(is_alone=True)) == [(name, 7)]
+        assert list(machine.store.results.found()) == [(name, 7)]
 
 
 @pytest.mark.anyio
@@ -327,9 +323,9 @@ def test_all_machines_see_one_identity_of_a_store(machines: Machines) -> None:
 
 def test_two_stores_of_one_service_have_two_identities(tmp_path: Path) -> None:
     stores: list[Store] = [
-        *(FolderStore(tmp_path / name) for name in ("one", "two")),
+        *(Store(tmp_path / name) for name in ("one", "two")),
         *(
-            ObjectStore(Objects(MemoryStore()), tmp_path / "copies", 10**9, name)
+            BucketStore(Bucket(MemoryStore()), tmp_path / "copies", 10**9, name)
             for name in ("three", "four")
         ),
     ]

@@ -253,6 +253,23 @@ def carrier(mesh, point) -> int:
     return sum(weight > 0 for weight in mesh.point(point).barycentric)
 
 
+def test_paths_to_points_are_found_where_vertices_lie_beyond_the_limit():
+    """Beside an edge of three faces, all of whose vertices but one are beyond it."""
+    corners = [[0, 0, 0], [1, 0, 0], [0.2, 1, 0], [0.5, 0, 1], [0.8, -1, 0]]
+    mesh = gc.TriangleMesh(corners, [[0, 1, 2], [1, 0, 3], [0, 1, 4]])
+    source = gc.SurfacePoint.face(1, (0.918, 0.062, 0.02))
+    target = gc.SurfacePoint.face(2, (0.186, 0.7, 0.114))
+    exact = gc.exact_distance(mesh, source).distance_at(target)
+    assert exact < 0.4
+    for targets in ([], [target]):
+        for retain in ("paths", "windows"):
+            field = gc.exact_distance(mesh, source, 0.4, targets=targets, retain=retain)
+            assert np.isinf(field.distances).sum() >= 3
+            path = field.path_to(target)
+            assert path.length == pytest.approx(exact, rel=SAME)
+            check_path(mesh, path, source, target, exact)
+
+
 @pytest.mark.parametrize(("share", "corners"), [(0.9, 2), (1.1, 3)])
 def test_weight_divides_what_is_on_an_edge_from_what_is_inside(cube, share, corners):
     small = share * WEIGHT

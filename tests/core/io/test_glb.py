@@ -165,7 +165,7 @@ def test_glb_places_beyond_all_numbers_are_refused_without_a_warning() -> None:
         (("accessors", 1, "count"), "9", "accessors[1].count is '9'"),
         (("accessors", 1, "count"), True, "accessors[1].count is True"),
         (("accessors", 1, "count"), 10, "accessor 1 of the glTF document: it has 10"),
-        (("accessors", 1, "count"), 8, "accessor 1 of the glTF document has 8 corners"),
+        (("accessors", 1, "count"), 8, "accessor 1 of the glTF document: its 8 corners"),
         (("accessors", 1, "type"), "VEC3", "accessor 1 of the glTF document: indices"),
         (("nodes", 0, "mesh"), 4, "nodes[0].mesh is 4"),
         (("nodes", 0, "matrix"), [1, 2, 3], "nodes[0].matrix is list"),

@@ -75,6 +75,7 @@ def test_heights_keep_the_order_of_the_file() -> None:
         (b"0 0 0\n", "lacks cellsize, ncols, nrows"),
         (b"ncols 1\nnrows 5\ncellsize 1\n0 0 0 0 0\n", "1 columns and 5 rows; it must have two"),
         (b"ncols 2\nnrows 2\ncellsize 1\n0 0 0\n", "declares 2 columns and 2 rows, but has 3 heig"),
+        (b"ncols 2\nnrows 2\ncellsize 1\n0 0 0 0 0\n", "2 columns and 2 rows, but has 5 heights"),
         (b"ncols 2\nnrows 2\ncellsize 1\n0 0 0 1,5\n", "height 3 reads '1,5'"),
         (b"ncols 1e9\nnrows 2\ncellsize 1\n0 0 0 0\n", "ncols of the grid is 1e.09; the file is"),
         (b"ncols nan\nnrows 2\ncellsize 1\n0 0 0 0\n", "ncols of the grid is nan"),

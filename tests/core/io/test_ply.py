@@ -91,7 +91,7 @@ def test_lists_may_stand_anywhere(form: str, uneven: bool) -> None:
 @every_form
 @pytest.mark.parametrize(
     ("behind", "words"),
-    [(b"\n", ""), (b"\r\n\r\n", ""), (b"7 7 7\n", "1 row|5 bytes"), (bytes(64), "1 row|64 byt")],
+    [(b"\n", ""), (b"\r\n\r\n", ""), (b"7 7 7\n", "1 row|6 bytes"), (bytes(64), "1 row|64 byt")],
 )
 def test_what_lies_behind_the_last_element_is_left_out(
     form: str, behind: bytes, words: str
@@ -129,6 +129,31 @@ def test_lists_and_strips_that_lie_are_refused(form: str) -> None:
     ):
         with pytest.raises(InvalidMesh, match=message):
             gc.load_mesh(data, "ply")
+
+
+@every_form
+def test_axes_are_found_by_their_names_and_each_is_there_once(form: str) -> None:
+    turned = [[z, 7.0, x, y] for x, y, z in ROWS]
+    properties = ["float z", "float weight", "float x", "float y"]
+    faces = ("face", CORNERS, [[quad] for quad in QUADS])
+    check_plane(gc.load_mesh(file_of(form, [("vertex", properties, turned), faces]), "ply"))
+    for axes in (["float x", "float y", "float w"], ["float x", "float y", "float x"]):
+        data = file_of(form, [("vertex", axes, ROWS), faces])
+        with pytest.raises(InvalidMesh, match="must have x, y and z once each"):
+            gc.load_mesh(data, "ply")
+
+
+@pytest.mark.parametrize("order", "<>")
+@pytest.mark.parametrize("first", [3, -1])
+def test_a_list_with_fewer_items_than_none_is_refused(order: str, first: int) -> None:
+    """In the first record, by which the others are read, and in a later one."""
+    form = {"<": "little", ">": "big"}[order]
+    head = file_of(f"binary_{form}_endian", [("vertex", XYZ, ROWS), ("face", CORNERS, [])])
+    head = head.replace(b"element face 0", b"element face 2").replace(b"list uchar", b"list char")
+    lists = [struct.pack(f"{order}b3i", count, 0, 1, 2) for count in (first, -1)]
+    bad = 0 if first < 0 else 1
+    with pytest.raises(InvalidMesh, match=f"list of face {bad} of the PLY file has -1 items"):
+        gc.load_mesh(head + b"".join(lists), "ply")
 
 
 def test_a_row_without_its_list_names_itself() -> None:

@@ -85,7 +85,7 @@ def check_on_the_surface(both, path, source, target, distance):
     without = {int(face): i for i, face in enumerate(both.place)}
     moved = gc.GeodesicPath(
         mesh=clean,
-        points=path.points,
+        _points=path.points,
         faces=np.array([without[face] for face in path.faces.tolist()], np.int32),
         length=path.length,
         error_bound=path.error_bound,

@@ -45,12 +45,12 @@ def test_another_length_is_refused(path):
 @pytest.mark.parametrize("k", [0, -1])
 def test_another_end_is_refused(path, k):
     with pytest.raises(AssertionError):
-        check(replace(path, points=changed(path.points, k, path.points[k] + 1e-12)))
+        check(replace(path, _points=changed(path.points, k, path.points[k] + 1e-12)))
 
 
 def test_another_point_is_refused(path):
     with pytest.raises(AssertionError, match="weights give the point"):
-        check(replace(path, points=changed(path.points, EDGE, path.points[EDGE] + 1e-12)))
+        check(replace(path, _points=changed(path.points, EDGE, path.points[EDGE] + 1e-12)))
 
 
 @pytest.mark.parametrize(

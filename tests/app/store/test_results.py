@@ -1,155 +1,41 @@
+"""Results: what is held, what goes, and what is refused."""
+
 import os
-import shutil
+import time
 import tracemalloc
 import zlib
 from pathlib import Path
 
 import anyio
-import numpy as np
 import pytest
 
-import geodesic_core as gc
 from app.errors import ProblemError
-from app.store import verified
-from app.store.manifests import encode_manifest, read_manifest
-from app.store.meshes import MeshStore
+from app.store import folder
+from app.store.folder import Folder
 from app.store.results import (
     SMALL,
-    FolderResults,
     Result,
+    ResultFiles,
     ResultStore,
     write_result,
     write_result_file,
 )
 from tests.support.faults import flip_bytes
-from tests.support.service import store_mesh
-
-SQUARE = (
-    np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float),
-    np.array([[0, 1, 2], [0, 2, 3]]),
-)
 
 
-@pytest.fixture
-def meshes(tmp_path: Path) -> MeshStore:
-    return MeshStore(tmp_path)
-
-
-def damage(path: Path) -> None:
-    content = bytearray(path.read_bytes())
-    content[-1] ^= 1
-    path.write_bytes(content)
-
-
-def damage_of(meshes: MeshStore, mesh_id: str) -> list[str]:
-    return [str(error) for error in meshes.inspect(mesh_id) if error is not None]
-
-
-def code_of(call) -> str:
-    with pytest.raises(ProblemError) as caught:
-        call()
-    return caught.value.problem.code
-
-
-def test_a_mesh_comes_back_as_it_was(meshes: MeshStore, tmp_path: Path) -> None:
-    mesh = gc.TriangleMesh(*SQUARE)
-
-    opened = meshes.open(store_mesh(tmp_path, mesh))
-
-    assert opened.warnings == list(mesh.warnings)
-    assert opened.mesh.arrays().keys() == mesh.arrays().keys()
-    for name, array in mesh.arrays().items():
-        np.testing.assert_array_equal(opened.mesh.arrays()[name], array)
-        assert opened.mesh.arrays()[name].dtype == array.dtype
-        assert not opened.mesh.arrays()[name].flags.writeable
-
-
-def test_the_id_is_of_the_content(tmp_path: Path) -> None:
-    vertices, faces = SQUARE
-    mesh_id = store_mesh(tmp_path, gc.TriangleMesh(vertices, faces))
-
-    assert store_mesh(tmp_path, gc.TriangleMesh(vertices.tolist(), faces.tolist())) == mesh_id
-    assert store_mesh(tmp_path, gc.TriangleMesh(vertices * 2, faces)) != mesh_id
-    assert store_mesh(tmp_path, gc.TriangleMesh(vertices, faces[::-1])) != mesh_id
-
-
-def test_a_vertex_map_is_part_of_the_content(tmp_path: Path) -> None:
-    vertices, faces = SQUARE
-    doubled = np.concatenate([vertices, vertices])
-
-    merged = gc.TriangleMesh(doubled, faces, merge="exact")
-
-    assert store_mesh(tmp_path, merged) != store_mesh(tmp_path, gc.TriangleMesh(vertices, faces))
-
-
-def test_a_mesh_that_is_stored_is_not_written_again(meshes: MeshStore, tmp_path: Path) -> None:
-    mesh = gc.TriangleMesh(*SQUARE)
-    mesh_id = store_mesh(tmp_path, mesh, "alice")
-
-    written = meshes.write_aside(mesh, tmp_path / "aside", "bob")
-
-    assert (written.mesh_id, written.folder) == (mesh_id, None)
-    assert written.manifest["owner"] == "alice"
-    assert not (tmp_path / "aside").exists()
-
-
-@pytest.mark.parametrize("file", ["vertices.npy", "faces.npy", "component.npy"])
-def test_a_changed_array_is_noticed(meshes: MeshStore, tmp_path: Path, file: str) -> None:
-    mesh_id = store_mesh(tmp_path, gc.TriangleMesh(*SQUARE))
-    damage(tmp_path / "meshes" / mesh_id / file)
-
-    assert code_of(lambda: meshes.open(mesh_id)) == "mesh_damaged"
-    (found,) = damage_of(meshes, mesh_id)
-    assert f"its array {file.removesuffix('.npy')} has changed since it was written" in found
-
-
-@pytest.mark.parametrize("content", [b"", b"[]", b"{}", b'{"id": "of another"}'])
-def test_a_broken_manifest_is_noticed(meshes: MeshStore, tmp_path: Path, content: bytes) -> None:
-    mesh_id = store_mesh(tmp_path, gc.TriangleMesh(*SQUARE))
-    (tmp_path / "meshes" / mesh_id / "manifest.json").write_bytes(content)
-
-    assert code_of(lambda: meshes.manifest(mesh_id)) == "mesh_damaged"
-    (found,) = damage_of(meshes, mesh_id)
-    assert "its manifest" in found
-
-
-def test_a_missing_array_is_noticed(meshes: MeshStore, tmp_path: Path) -> None:
-    mesh_id = store_mesh(tmp_path, gc.TriangleMesh(*SQUARE))
-    (tmp_path / "meshes" / mesh_id / "faces.npy").unlink()
-
-    assert code_of(lambda: meshes.open(mesh_id)) == "mesh_damaged"
-
-
-def test_a_mesh_under_the_name_of_another_is_noticed(meshes: MeshStore, tmp_path: Path) -> None:
-    """Checksums are right, but what results are named by is not."""
-    vertices, faces = SQUARE
-    ids = [store_mesh(tmp_path, gc.TriangleMesh(vertices * scale, faces)) for scale in (1, 2)]
-    assert [damage_of(meshes, mesh_id) for mesh_id in ids] == [[], []]
-    first, second = (tmp_path / "meshes" / mesh_id for mesh_id in ids)
-    for path in second.iterdir():
-        shutil.copy(path, first)
-    assert "its manifest belongs to another mesh" in damage_of(meshes, ids[0])[0]
-    renamed = {**read_manifest(str(first / "manifest.json")), "id": ids[0]}
-    (first / "manifest.json").write_bytes(encode_manifest(renamed))
-
-    (found,) = damage_of(meshes, ids[0])
-    assert "its id does not match its content" in found
-
-
-@pytest.mark.parametrize("mesh_id", ["", "..", "0" * 32, "../meshes", "G" * 32])
-def test_unknown_ids(meshes: MeshStore, mesh_id: str) -> None:
-    assert code_of(lambda: meshes.manifest(mesh_id)) == "mesh_not_found"
-    assert code_of(lambda: meshes.array_file(mesh_id, "faces")) == "mesh_not_found"
-
-
-# Results
+def opened(
+    root: Path, capacity: int = 100, memory: int = 0, quota: int | None = None
+) -> ResultStore:
+    files = Folder(root)
+    files.is_alone = True
+    store = ResultStore(ResultFiles(files), capacity, memory, quota)
+    store.prepare()
+    return store
 
 
 @pytest.fixture
 def results(tmp_path: Path) -> ResultStore:
-    store = ResultStore(FolderResults(tmp_path / "results"), 100, memory=0)
-    store.prepare()
-    return store
+    return opened(tmp_path)
 
 
 def write(root: Path, name: str, size: int = 40, *, is_cheap: bool = False):
@@ -201,7 +87,7 @@ def test_what_is_being_sent_stays(results: ResultStore, tmp_path: Path) -> None:
 
 def test_a_changed_result_is_not_served(results: ResultStore, tmp_path: Path) -> None:
     put(results, tmp_path, "m/a")
-    damage(tmp_path / "results" / "m" / "a.body")
+    flip_bytes(tmp_path / "results" / "m" / "a.body")
 
     assert find(results, "m/a") is None
     assert find(results, "m/a") is None
@@ -221,8 +107,7 @@ def test_the_answer_of_a_job_stays_where_a_start_has_to_make_room(
         put(results, tmp_path, f"m/{key}")
         os.utime(tmp_path / "results" / "m" / f"{key}.json", (second, second))
 
-    restarted = ResultStore(FolderResults(tmp_path / "results"), 50, memory=0)
-    restarted.prepare()
+    restarted = opened(tmp_path, 50, 0)
     restarted.pin("m/job", None)
     restarted.make_room()
 
@@ -237,33 +122,13 @@ def test_results_survive_a_restart(results: ResultStore, tmp_path: Path) -> None
     (tmp_path / "results" / "m" / "incomplete.body").write_bytes(b"x")
     (tmp_path / "results" / "m" / "tmpabc").write_bytes(b"x")
 
-    restarted = ResultStore(FolderResults(tmp_path / "results"), 50, memory=0)
-    restarted.prepare()
+    restarted = opened(tmp_path, 50, 0)
     restarted.make_room()
 
     assert find(restarted, "m/old") is None
     assert find(restarted, "m/new") is not None
     names = sorted(path.name for path in (tmp_path / "results" / "m").iterdir())
     assert names == ["new.body", "new.json"]
-
-
-@pytest.mark.parametrize("suffix", [".json", ".body"])
-def test_a_result_that_another_service_removes_during_the_start_is_not_there(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str
-) -> None:
-    root = tmp_path / "results"
-    for name in ("m/one", "m/two"):
-        write_result(root, name, [b"x"], {}, "code", is_cheap=False)
-    exists = Path.exists
-
-    def exists_for_the_last_time(path: Path) -> bool:
-        found = exists(path)
-        if path.stem == "one":
-            path.with_suffix(suffix).unlink()
-        return found
-
-    monkeypatch.setattr(Path, "exists", exists_for_the_last_time)
-    assert list(FolderResults(root).found(is_alone=False)) == [("m/two", 1)]
 
 
 def test_results_of_a_mesh_are_forgotten(results: ResultStore, tmp_path: Path) -> None:
@@ -277,15 +142,14 @@ def test_results_of_a_mesh_are_forgotten(results: ResultStore, tmp_path: Path) -
 
 
 def test_small_results_are_in_memory_as_far_as_they_fit(tmp_path: Path) -> None:
-    results = ResultStore(FolderResults(tmp_path / "results"), 10**6, memory=2 * 4096 + 100)
-    results.prepare()
+    results = opened(tmp_path, 10**6, 2 * 4096 + 100)
     for key in "abc":
         put(results, tmp_path, f"m/{key}")
     put(results, tmp_path, "m/large", 2**17)
 
     found = {key: find(results, f"m/{key}").body for key in ("c", "b", "large", "a")}
     assert found == {"c": b"x" * 40, "b": b"x" * 40, "large": None, "a": b"x" * 40}
-    damage(tmp_path / "results" / "m" / "a.body")
+    flip_bytes(tmp_path / "results" / "m" / "a.body")
     assert find(results, "m/a").body == b"x" * 40, "read a moment ago"
     results.forget_mesh("m")
     assert find(results, "m/a") is None
@@ -293,7 +157,7 @@ def test_small_results_are_in_memory_as_far_as_they_fit(tmp_path: Path) -> None:
 
 def test_the_memory_of_small_results_is_counted_whole(tmp_path: Path) -> None:
     memory = 2**22
-    results = ResultStore(FolderResults(tmp_path / "results"), 10**6, memory=memory)
+    results = opened(tmp_path, 10**6, memory)
     headers = {"Geodesic-Method": "exact", "Geodesic-Error": "0.0", "Geodesic-Vertices": "12"}
 
     def answer(number: int) -> Result:
@@ -337,9 +201,7 @@ def test_a_failed_result_leaves_nothing(tmp_path: Path) -> None:
 
 @pytest.fixture
 def roomy(tmp_path: Path) -> ResultStore:
-    store = ResultStore(FolderResults(tmp_path / "results"), 10**6, memory=2 * 4096 + 100)
-    store.prepare()
-    return store
+    return opened(tmp_path, 10**6, 2 * 4096 + 100)
 
 
 def test_what_is_small_and_found_at_once_has_no_files(roomy: ResultStore, tmp_path: Path) -> None:
@@ -368,13 +230,13 @@ def test_files_come_when_they_are_needed(roomy: ResultStore, tmp_path: Path) -> 
     assert roomy.body(filed).read_bytes() == b"x" * 40
     assert filed.manifest == taken.manifest
     assert anyio.run(roomy.with_files, filed) is filed
-    restarted = ResultStore(FolderResults(tmp_path / "results"), 10**6, memory=0)
-    restarted.prepare()
+    restarted = opened(tmp_path, 10**6, 0)
     assert find(restarted, "m/a").body == b"x" * 40
 
 
 def test_what_gets_no_files_is_given_back(roomy: ResultStore, tmp_path: Path) -> None:
     taken = roomy.add(write(tmp_path, "m/a", is_cheap=True))
+    (tmp_path / "results").mkdir()
     (tmp_path / "results" / "m").write_bytes(b"in the way")
 
     with pytest.raises(FileExistsError):
@@ -385,31 +247,45 @@ def test_what_gets_no_files_is_given_back(roomy: ResultStore, tmp_path: Path) ->
     assert find(roomy, "m/a") is None, "what is in use would stay"
 
 
-def test_a_large_result_is_read_once_for_each_version_of_its_file(
+def test_a_large_result_is_read_once_by_each_process(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Clients read it in many ranges, each of which finds it again."""
-    root, reads = tmp_path / "results", list[str]()
-    read = verified.read_checksum
-    monkeypatch.setattr(verified, "read_checksum", lambda path: reads.append(path) or read(path))
+    root, reads = tmp_path / "results", list[Path]()
+    read = folder.checksum_of
+    monkeypatch.setattr(folder, "checksum_of", lambda path: reads.append(path) or read(path))
     body = bytes(3 * SMALL)
     write = lambda file: file.write(body)  # noqa: E731
     result = write_result_file(root, "m/a", write, {}, "code", lambda: None)
     assert (result.manifest.size, result.manifest.crc32) == (len(body), zlib.crc32(body))
-    store = ResultStore(FolderResults(root), 10**6, memory=0)
-    store.prepare()
+    store = opened(tmp_path, 10**6, 10**6)
     for _ in range(3):
         assert anyio.run(store.find, "m/a") == result
     assert len(reads) == 1
-    for _ in range(3):
-        store.release(result)
     flip_bytes(root / "m" / "a.body")
-    assert anyio.run(store.find, "m/a") is None
+    assert anyio.run(opened(tmp_path, 10**6).find, "m/a") is None
+
+
+def test_a_large_result_that_another_service_has_evicted_is_not_there(tmp_path: Path) -> None:
+    store = opened(tmp_path, 10**6, 10**6)
+    put(store, tmp_path, "m/a", 3 * SMALL)
+    (tmp_path / "results" / "m" / "a.body").unlink()
+    assert find(store, "m/a") is None
     assert store.nbytes == 0
 
 
+def test_what_was_used_before_the_clock_was_set_back_goes_first(tmp_path: Path) -> None:
+    for name in ("m/a", "m/b"):
+        write(tmp_path, name)
+    years_ahead = time.time() + 10 * 365 * 86_400
+    os.utime(tmp_path / "results" / "m" / "b.json", (years_ahead, years_ahead))
+    results = opened(tmp_path, 50)
+    results.make_room()
+    assert [path.name for path in tmp_path.glob("results/m/*.body")] == ["a.body"]
+
+
 def test_room_is_reserved_among_pinned_results(tmp_path: Path) -> None:
-    store = ResultStore(FolderResults(tmp_path / "results"), 100, memory=0)
+    store = opened(tmp_path, 100, 0)
     store.add(write(tmp_path, "m/pinned", 40))
     store.pin("m/pinned", None)
     store.add(write(tmp_path, "m/other", 30))
@@ -434,7 +310,7 @@ def test_room_is_reserved_among_pinned_results(tmp_path: Path) -> None:
 
 def test_the_answers_of_one_owner_s_jobs_leave_room_for_others(tmp_path: Path) -> None:
     """Both what is pinned and what is reserved count; a shared answer counts for each owner."""
-    store = ResultStore(FolderResults(tmp_path / "results"), 100, memory=0, quota=50)
+    store = opened(tmp_path, 100, 0, quota=50)
     for name in ("m/a", "m/b", "m/c"):
         store.add(write(tmp_path, name, 30))
     store.pin_within_quota("m/a", "alice")

@@ -1,36 +1,28 @@
-"""Copies of the meshes of an object store."""
+"""A store of objects: the copies of its meshes, and what is left of work that was not finished."""
 
 import asyncio
-from datetime import timedelta
 from pathlib import Path
 
 import pytest
 from obstore.store import MemoryStore
 
 import geodesic_core as gc
+from app.store.bucket import Bucket
+from app.store.bucket_store import BucketStore
 from app.store.layout import FIELDS, RESULTS, TEMPORARY
 from app.store.meshes import MeshStore
-from app.store.object_meshes import ObjectMeshes
-from app.store.object_store import ObjectStore
-from app.store.objects import Objects
-
-
-def machine(objects: Objects, folder: Path) -> ObjectMeshes:
-    meshes = ObjectMeshes(objects, folder, 10**9)
-    meshes.prepare()
-    return meshes
 
 
 def test_pulls_at_the_same_time_leave_no_lock(tmp_path: Path) -> None:
-    objects = Objects(MemoryStore())
-    one, two = (machine(objects, tmp_path / name) for name in ("one", "two"))
-    written = MeshStore(tmp_path / "one").write_aside(
-        gc.samples.plane(20), tmp_path / "scratch", owner=None
-    )
+    objects = Bucket(MemoryStore())
+    one, two = (BucketStore(objects, tmp_path / name, 10**9, "memory") for name in ("one", "two"))
 
     async def main() -> None:
-        await one.send(written)
-        await one.put(written, is_new=True)
+        written = MeshStore(one.folder).write_aside(
+            gc.samples.plane(20), one.folder / TEMPORARY / "mesh", owner=None
+        )
+        await one.send_mesh(written)
+        await one.meshes.put(written)
         together = asyncio.Barrier(3)
 
         async def use() -> None:
@@ -39,31 +31,30 @@ def test_pulls_at_the_same_time_leave_no_lock(tmp_path: Path) -> None:
 
         await asyncio.gather(*(use() for _ in range(3)))
 
-    asyncio.run(main())
-    assert not two._pulls
+    with one.owned(), two.owned():
+        asyncio.run(main())
+    assert not two._copies._pulls
 
 
 def test_what_uploads_left_is_removed_a_day_later(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A service that is killed leaves the file, and a host the arrays."""
-    objects = Objects(MemoryStore())
-    meshes = machine(objects, tmp_path)
+    objects = Bucket(MemoryStore())
+    store = BucketStore(objects, tmp_path, 10**9, "memory")
     left = ("uploads/tmp/scratch/upload", f"meshes/{32 * 'a'}/scratch-mesh/vertices.npy")
     for name in left:
         objects.write(name, b"content")
-    assert not meshes.found()
-    assert [objects.size(name) for name in left] == [7, 7]
-
-    monkeypatch.setattr("app.store.objects._ABANDONED", -timedelta(days=1))
-    assert not meshes.found()
-    assert [objects.size(name) for name in left] == [None, None]
+    for sizes in ([7, 7], [None, None]):
+        store.claim("a database")
+        assert not store.meshes.found()
+        assert [objects.size(name) for name in left] == sizes
+        monkeypatch.setattr("app.store.bucket.ABANDONED_S", -86_400.0)
 
 
 def test_a_start_removes_what_a_killed_process_left_unfinished(tmp_path: Path) -> None:
-    store = ObjectStore(Objects(MemoryStore()), tmp_path, 10**9, "memory")
+    store = BucketStore(Bucket(MemoryStore()), tmp_path, 10**9, "memory")
     pull = tmp_path / TEMPORARY / "a pull"
-    pull.mkdir(parents=True)
     files = [
         pull / "vertices.npy",
         tmp_path / TEMPORARY / "a file",

@@ -6,7 +6,8 @@ no database is shared.
 
 import shutil
 from collections.abc import AsyncIterator, Iterator, Sequence
-from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager, suppress
 from pathlib import Path
 
 import orjson
@@ -15,13 +16,14 @@ from anyio import to_thread
 from app.errors import StoreUnavailableError
 from app.settings import variable_of
 from app.store.atomic import remove_partial
+from app.store.bucket import Bucket
 from app.store.layout import FIELDS, RESULTS, TEMPORARY, StoreError, make_identity
+from app.store.mesh_copies import CopiedMeshes
 from app.store.meshes import WrittenMesh
-from app.store.object_meshes import ObjectMeshes
-from app.store.object_results import ObjectResults
-from app.store.objects import UPLOADS, Objects
-from app.store.ownership import owned
-from app.store.results import FolderResults, Result, body_path
+from app.store.objects import UPLOADS
+from app.store.ownership import Share
+from app.store.results import Result, ResultFiles, body_path
+from app.store.store import Store
 
 VARIABLES = {
     "s3": ("AWS_ENDPOINT_URL", "AWS_ACCESS_KEY_ID"),
@@ -31,36 +33,43 @@ VARIABLES = {
 """Variables of the environment from which obstore takes endpoints and credentials, by scheme"""
 
 _OWNER = "owner.json"
+_FETCHED_AT_ONCE = 4
 
 
-class ObjectStore:
-    """The store in ``objects``, see ``Store`` and ``Supply``, with copies of meshes in ``folder``.
+class BucketStore(Store):
+    """The store in ``objects``, see ``Store``, with copies of meshes in ``folder``.
 
-    The copies take ``capacity`` bytes.
+    The copies take ``capacity`` bytes. It brings what work needs to that folder, and takes away
+    what it made.
     """
 
-    def __init__(self, objects: Objects, folder: Path, capacity: int, name: str) -> None:
-        self.folder = folder
-        self.meshes = ObjectMeshes(objects, folder, capacity)
-        self.results = ObjectResults(objects)
+    def __init__(self, objects: Bucket, folder: Path, capacity: int, name: str) -> None:
+        super().__init__(folder)
+        self._copies = CopiedMeshes(objects, folder, capacity)
+        self.meshes = self._copies
+        self._local_results = self.results
+        self.results = ResultFiles(objects)
         self.supply = self
-        self._local_results = FolderResults(folder / RESULTS)
         self._objects = objects
         self._name = name
 
     @contextmanager
-    def owned(self, *, is_shared: bool = False) -> Iterator[None]:  # noqa: ARG002 - the folder is not
-        """Lock the folder, which is this process's alone."""
-        with owned(self.folder):
-            self._remove_unfinished()
-            self.meshes.prepare()
-            yield
+    def owned(self, *, is_shared: bool = False) -> Iterator[Share]:  # noqa: ARG002 - the folder is not
+        """Lock the folder, which is this process's alone; remove what a former one left there."""
+        with super().owned() as share:
+            for name in (RESULTS, TEMPORARY):
+                _remove(self.folder / name)
+            (self.folder / TEMPORARY).mkdir()
+            remove_partial(self.folder / FIELDS)
+            yield share
 
     def claim(self, service: str | None) -> None:
-        """Mark the store by an object that is written once."""
+        """Mark the store by an object that is written once; remove what uploads have left."""
         content = orjson.dumps({"service": service or make_identity(self.folder)})
         try:
             is_ours = self._objects.create(_OWNER, content)
+            uploads = self._objects.found(UPLOADS) if is_ours else ()
+            self._objects.remove(*(each.name for each in uploads if each.is_abandoned))
         except FileNotFoundError:
             raise StoreError(
                 f"the store {self._name} does not exist: create its bucket or container first"
@@ -98,12 +107,12 @@ class ObjectStore:
             await to_thread.run_sync(self._objects.remove, name)
 
     def holding(self, mesh_id: str) -> AbstractAsyncContextManager[None]:
-        """Hold a copy of a mesh."""
-        return self.meshes.holding(mesh_id)
+        """Have a mesh in the folder inside the block."""
+        return self._copies.holding(mesh_id)
 
     @asynccontextmanager
     async def bringing(self, file: Path | None, folder: Path) -> AsyncIterator[None]:
-        """Fetch a file that is not here."""
+        """Have a lent file, if any, and the parent of a folder to come, inside the block."""
         parents = {folder.parent} if file is None else {folder.parent, file.parent}
         new = [each for each in parents if not each.is_dir()]
         for each in new:
@@ -118,37 +127,48 @@ class ObjectStore:
 
     @asynccontextmanager
     async def bringing_results(self, names: Sequence[str]) -> AsyncIterator[None]:
-        """Fetch the bodies of some results, and remove them afterwards."""
-        files = {name: body_path(self.folder / RESULTS, name) for name in names}
+        """Have the bodies of some results in the folder inside the block.
+
+        Raises ``StoreUnavailableError`` where one is gone or damaged.
+        """
         try:
-            if files:
-                await to_thread.run_sync(self.results.fetch, files)
+            await to_thread.run_sync(self._fetch_all, names)
             yield
         finally:
             for name in names:
                 self._local_results.remove(name)
 
     async def send_mesh(self, written: WrittenMesh) -> bool:
-        """Send a mesh."""
-        return await self.meshes.send(written)
+        """Send the files of a mesh; False where it is to be written again."""
+        return await self._copies.send(written)
 
     async def send_result(self, result: Result) -> None:
-        """Send a result."""
-        await self.results.send(result, self._local_results.body(result))
+        """Send the files of a result."""
+        path = body_path(self.folder / RESULTS, result.name)
+        await self.results.write(result.name, path, result.manifest)
 
     def discard_result(self, name: str) -> None:
-        """Remove the local files of a result."""
+        """Remove the files of a result here, if there are any."""
         self._local_results.remove(name)
 
-    async def distrust(self, mesh_id: str) -> None:
-        """Drop the copy of a mesh."""
-        await self.meshes.distrust(mesh_id)
+    async def drop_copy(self, mesh_id: str) -> None:
+        """Pull a mesh again before it is used."""
+        await self._copies.drop_copy(mesh_id)
 
-    def _remove_unfinished(self) -> None:
-        """Remove what was under way when a former process died: answers, pulls, and fields."""
-        for name in (RESULTS, TEMPORARY):
-            _remove(self.folder / name)
-        remove_partial(self.folder / FIELDS)
+    def _fetch_all(self, names: Sequence[str]) -> None:
+        with ThreadPoolExecutor(_FETCHED_AT_ONCE) as pool:
+            list(pool.map(self._fetch, names))
+
+    def _fetch(self, name: str) -> None:
+        manifest, path = self.results.manifest(name), body_path(self.folder / RESULTS, name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with suppress(FileNotFoundError):
+            if manifest is not None:
+                fetched = self._objects.fetch(self.results.body_name(name, manifest), path)
+                if fetched == manifest.crc32:
+                    return
+        self.results.remove(name)
+        raise StoreUnavailableError(f"the stored result {name} is gone or damaged")
 
     def _upload_name(self, file: Path) -> str:
         return f"{UPLOADS}/{file.relative_to(self.folder).as_posix()}"
