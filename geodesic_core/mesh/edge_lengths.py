@@ -75,9 +75,10 @@ def _agreed(lengths: Floats, faces: Longs) -> Floats:
     """Return the lengths of faces, each as the lowest face of its edge has it."""
     ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
     ends = np.sort(ends, axis=1)
-    _, first, edge = np.unique(ends, axis=0, return_index=True, return_inverse=True)
+    keys = ends[:, 0] << 32 | ends[:, 1]
+    _, first, edge = np.unique(keys, return_index=True, return_inverse=True)
     flat = lengths.reshape(-1)
-    agreed: Floats = flat[first][edge.reshape(-1)]
+    agreed: Floats = flat[first][edge]
     apart = np.abs(flat / agreed - 1.0)
     worst = int(apart.argmax())
     if apart[worst] > ROUNDED_LENGTH:
