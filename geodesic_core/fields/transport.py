@@ -39,13 +39,13 @@ def transported(question: Question, angle: float, control: Control) -> Floats:
     scales[:count] = np.where(topology.flags & FANS, np.nan, scales_of(topology))
     turns = np.full(len(bends), np.nan)
     turns[question.nodes.sources] = frame.turn_of(angle)
-    sides = np.where(vertices.mirrored, -1.0, 1.0)
+    sides, is_closed = np.where(vertices.mirrored, -1.0, 1.0), ~is_open(topology)
     for reached in _by_bends(bends, np.isfinite(leaving)):
         at = vertices.winner_ints[reached, PREDECESSOR]
         aside = turns[at] - scales[at] * leaving[reached]  # of the way
         vertex = np.minimum(at, count - 1)  # a source that is none has no way back
-        total, is_closed = topology.total_angle[vertex], ~is_open(topology)[vertex]
-        straight = is_straight(arriving[at], leaving[reached], total, is_closed)
+        fan = topology.total_angle[vertex], is_closed[vertex]
+        straight = is_straight(arriving[at], leaving[reached], *fan)
         aside[straight] = (turns[at] - scales[at] * arriving[at] - math.pi)[straight]
         turns[reached] = scales[reached] * arriving[reached] + math.pi + sides[reached] * aside
     return _in_frames(mesh, turns[:count], scales[:count])

@@ -31,7 +31,7 @@ class FileContents(NamedTuple):
     notes: tuple[str, ...] = ()
     """Sentences on how the file was read"""
     lengths: NDArray[Any] | None = None
-    """(P, 3) of a file of triangles that gives the lengths of their edges; its vertices may be NaN
+    """(P, 3) of a file of triangles that gives the lengths of their edges; it may have no vertices
     then"""
 
     @classmethod

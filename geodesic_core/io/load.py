@@ -163,7 +163,7 @@ def load_mesh(
     if read.lengths is not None:
         if merge != "none":
             raise InvalidArgument("merge must be 'none' for a surface that is given by its lengths")
-        positions = None if np.isnan(read.vertices).all() else read.vertices
+        positions = read.vertices if len(read.vertices) else None
         return TriangleMesh.from_lengths(read.corners.reshape(-1, 3), read.lengths, positions)
     return TriangleMesh.from_polygons(read.vertices, read.corners, read.sizes, merge, notes)
 

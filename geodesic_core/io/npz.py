@@ -1,9 +1,12 @@
 """Surfaces given by the lengths of their edges: NumPy's archives of arrays."""
 
 import io
+import math
 import zipfile
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geodesic_core.errors import InvalidMesh
 from geodesic_core.io.contents import FileContents
@@ -13,26 +16,40 @@ from geodesic_core.mesh.validation import as_faces, as_vertices
 
 def read_npz(data: bytes, max_faces: int | None) -> FileContents:
     """Read the arrays ``faces``, ``lengths`` and, if it is there, ``vertices``; of ``np.savez``."""
-    with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-        missing = [name for name in ("faces", "lengths") if name not in archive]
-        if missing:
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        names = [name.removesuffix(".npy") for name in archive.namelist()]
+        if not {"faces", "lengths"} <= set(names):
             raise InvalidMesh(
-                f"the NPZ file has the arrays {', '.join(archive) or 'none'}; it must have faces "
-                "and lengths, and may have vertices"
+                f"the NPZ file has the arrays {', '.join(names[:5])}; it must have faces and "
+                "lengths, and may have vertices"
             )
-        check_face_count(_rows_of(archive.zip, "faces"), max_faces)
-        faces, lengths = as_faces(archive["faces"]), archive["lengths"]
-        vertices = as_vertices(archive["vertices"]) if "vertices" in archive else None
-    places = np.full((int(faces.max()) + 1, 3), np.nan) if vertices is None else vertices
-    return FileContents.of_triangles(places, faces)._replace(lengths=lengths)
+        faces = as_faces(_array(archive, "faces", max_faces))
+        lengths = _array(archive, "lengths", max_faces)
+        vertices = np.empty((0, 3))
+        if "vertices" in names:
+            vertices = as_vertices(_array(archive, "vertices", None))
+    return FileContents.of_triangles(vertices, faces)._replace(lengths=lengths)
 
 
-def _rows_of(archive: zipfile.ZipFile, name: str) -> int:
-    """Return the number of rows that the header of an array declares."""
-    with archive.open(f"{name}.npy") as file:
+def _array(archive: zipfile.ZipFile, name: str, max_rows: int | None) -> NDArray[Any]:
+    """Return an array of an archive; refuse one that declares more than it holds.
+
+    NumPy would reserve memory for all that a header declares.
+    """
+    entry = archive.getinfo(f"{name}.npy")
+    with archive.open(entry) as file:
         version = np.lib.format.read_magic(file)
         read = np.lib.format.read_array_header_1_0
         if version != (1, 0):
             read = np.lib.format.read_array_header_2_0
-        shape, _, _ = read(file)
-    return int(shape[0]) if shape else 0
+        shape, _, dtype = read(file)
+    declared = math.prod(shape) * dtype.itemsize
+    if min(shape, default=0) < 0 or declared > entry.file_size:
+        raise InvalidMesh(
+            f"the array {name} of the NPZ file declares {declared} bytes, but has at most "
+            f"{entry.file_size}"
+        )
+    check_face_count(shape[0] if shape else 0, max_rows)
+    with archive.open(entry) as file:
+        array: NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)
+    return array

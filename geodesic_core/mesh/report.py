@@ -13,14 +13,10 @@ from geodesic_core.kernels.mesh.build import count_boundary_loops
 from geodesic_core.kernels.mesh.half_edges import (
     BOUNDARY,
     FANS,
-    HEAD,
-    LENGTH,
     SADDLE,
     SEAM,
     SIN_LEFT,
-    TAIL,
     Embedding,
-    Topology,
 )
 from geodesic_core.mesh.degeneracies import (
     edges_of_no_length,
@@ -152,10 +148,11 @@ class MeshReport:
         return asdict(self)
 
 
-def edges_of(faces: Ints) -> tuple[Ints, Ints, NDArray[np.bool_]]:
+def edges_of(faces: Ints) -> tuple[Ints, Ints, NDArray[np.bool_], Longs]:
     """Return the edges of some faces, (E, 2), lower vertex first; O(F log F).
 
-    With each: the number of its faces, and whether it has two that run it the same way.
+    With each: the number of its faces, whether it has two that run it the same way, and its first
+    side, three a face.
     """
     tails, heads = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
     ends = np.stack([np.minimum(tails, heads), np.maximum(tails, heads)], axis=1)
@@ -165,7 +162,7 @@ def edges_of(faces: Ints) -> tuple[Ints, Ints, NDArray[np.bool_]]:
     )
     upward = np.bincount(edge, tails < heads)
     same_way = (count == 2) & (upward != 1.0)
-    return ends[first], count.astype(np.int32), same_way
+    return ends[first], count.astype(np.int32), same_way, first
 
 
 def report_of(
@@ -173,12 +170,11 @@ def report_of(
     faces: Ints,
     face_map: Longs | None,
     embedding: Embedding,
-    *,
-    by_lengths: bool,
+    lengths: Floats | None,
 ) -> MeshReport:
     """Return the report of a mesh; O(V log V + F log F).
 
-    Where it is given ``by_lengths``, positions tell nothing of what is joined.
+    Where it is given by ``lengths`` (F, 3), positions tell nothing of what is joined.
     """
     topology = embedding.topology
     inner = topology.inner_vertex
@@ -193,9 +189,13 @@ def report_of(
     outside = np.setdiff1d(np.arange(len(faces)), surface)
     is_collapsed = of_three_vertices(faces[outside]) & ~of_three_vertices(inner[faces[outside]])
     collapsed = outside[is_collapsed]
-    edges, edge_faces, same_way = edges_of(corners)
-    first_used = used if by_lengths else used[first_equal(vertices[used])]
-    seams = NO_SEAMS if by_lengths else seams_of(embedding, used, first_used)
+    edges, edge_faces, same_way, sides = edges_of(corners)
+    if lengths is None:
+        edge_lengths = np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1)
+        first_used = used[first_equal(vertices[used])]
+        seams = seams_of(embedding, used, first_used)
+    else:
+        edge_lengths, first_used, seams = lengths[surface].reshape(-1)[sides], used, NO_SEAMS
     lowest = used[np.unique(topology.component[used], return_index=True)[1]]
     polygons = np.zeros(0) if face_map is None else np.bincount(face_map)
     return MeshReport(
@@ -225,14 +225,8 @@ def report_of(
         inconsistent_orientation=bool(same_way.any()),
         misoriented_edges=Sample.of(edges[same_way]),
         bounds=(tuple(vertices.min(axis=0).tolist()), tuple(vertices.max(axis=0).tolist())),
-        mean_edge_length=_mean_edge_length(topology),
+        mean_edge_length=float(edge_lengths.mean()),
     )
-
-
-def _mean_edge_length(topology: Topology) -> float:
-    ends = np.sort(topology.links[:, [TAIL, HEAD]], axis=1).astype(np.int64)
-    _, first = np.unique(ends[:, 0] << 32 | ends[:, 1], return_index=True)
-    return float(topology.geometry[first, LENGTH].mean())
 
 
 def warnings_of(report: MeshReport) -> Iterator[str]:

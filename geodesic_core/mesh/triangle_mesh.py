@@ -190,7 +190,7 @@ class TriangleMesh:
             (F, 3) mesh units: number i of a face is that of its edge from corner i to corner i + 1.
         vertices
             (V, 3) positions to draw the surface at, which need not have these lengths. None for
-            none: then vertices are numbered up to the highest that a face has.
+            none: then vertices are numbered up to the highest that a face has, and are 3 F at most.
 
         Returns
         -------
@@ -218,7 +218,8 @@ class TriangleMesh:
         """
         triangles = as_faces(faces)
         points = None if vertices is None else as_vertices(vertices)
-        count = int(triangles.max()) + 1 if points is None else len(points)
+        most = min(int(triangles.max()) + 1, triangles.size)  # a face can name any number
+        count = most if points is None else len(points)
         if points is not None:
             check_vertices(points)
         check_corners(triangles.reshape(-1), np.full(len(triangles), 3), count)
@@ -826,7 +827,7 @@ class TriangleMesh:
             self.faces,
             self.face_map,
             self.embedding,
-            by_lengths=self.lengths is not None,
+            lengths=self.lengths,
         )
 
     def tangent_frames(self) -> TangentFrames:

@@ -2,6 +2,7 @@
 
 import io
 import math
+import zipfile
 
 import numpy as np
 import pytest
@@ -190,6 +191,30 @@ def test_an_archive_of_arrays_is_read(with_vertices, save, tmp_path):
     np.savez(path, faces=mesh.faces)
     with pytest.raises(InvalidMesh, match="must have faces and lengths"):
         gc.load_mesh(path)
+
+
+@pytest.mark.parametrize("name", ["faces", "lengths", "vertices"])
+def test_an_array_that_declares_more_than_it_holds_is_refused(name):
+    """Without reserving the memory; and so is a face that names a vertex far beyond all others."""
+    arrays = {
+        "faces": np.array(TETRAHEDRON),
+        "lengths": np.ones((4, 3)),
+        "vertices": np.eye(4)[:, :3],
+    }
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w") as archive:
+        for each, array in arrays.items():
+            content = io.BytesIO()
+            np.save(content, array)
+            data = content.getvalue()
+            if each == name:
+                data = data.replace(b"(4, 3), }" + b" " * 12, b"(4000000000000, 3), }")
+                assert b"4000000000000" in data
+            archive.writestr(f"{each}.npy", data)
+    with pytest.raises(InvalidMesh, match=f"array {name} of the NPZ file declares"):
+        gc.load_mesh(file.getvalue())
+    with pytest.raises(InvalidMesh, match="vertices are numbered 0 to 11"):
+        gc.TriangleMesh.from_lengths([[0, 1, 2], *TETRAHEDRON[1:3], [1, 3, 2**40]], np.ones((4, 3)))
 
 
 def test_what_needs_space_says_so():
