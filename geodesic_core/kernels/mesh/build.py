@@ -176,19 +176,14 @@ def breadth_first_codes(faces: Ints, vertex_count: int) -> Ints:
 
 
 @kernel
-def renumber(
-    codes: Ints,
-    vertices: Floats,
-    faces: Ints,
-    inner_vertex: Ints,
-    outer_vertex: Ints,
-    outer_face: Ints,
-    positions: Floats,
-) -> Ints:
-    """Fill the three maps and ``positions``; return the faces in inner numbering; O(V + F).
+def renumber(codes: Ints, vertices: Floats, faces: Ints, embedding: Any) -> Ints:
+    """Fill the three maps and the positions; return the faces in inner numbering; O(V + F).
 
     Vertices are sorted by their codes.
     """
+    topology, positions = embedding
+    inner_vertex, outer_vertex = topology.inner_vertex, topology.outer_vertex
+    outer_face = topology.outer_face
     digits = np.empty(len(vertices), np.int32)
     order = first_integers(len(vertices))
     for shift in range(0, 3 * _MORTON_BITS, _RADIX_BITS):
@@ -358,11 +353,8 @@ def fill_geometry_by_lengths(
         for i in range(3):
             h, n, p = 3 * f + i, 3 * f + (i + 1) % 3, 3 * f + (i + 2) % 3
             cosine, sine = angle_by_lengths(lengths[h], lengths[p], lengths[n])
-            geometry[h, LENGTH], geometry[h, COS_LEFT], geometry[h, SIN_LEFT] = (
-                lengths[h],
-                cosine,
-                sine,
-            )
+            geometry[h, LENGTH] = lengths[h]
+            geometry[h, COS_LEFT], geometry[h, SIN_LEFT] = cosine, sine
             angles[h] = angle_of(cosine, sine)
             if sine <= NO_AREA:
                 pinched[f] = 1
@@ -546,25 +538,25 @@ def count_edges(links: Ints) -> int:
 def build_topology(vertices: Floats, faces: Ints, embedding: Any) -> tuple[Outcome, int]:
     """Fill the arrays of ``embedding`` in O(V + F); return (outcome, inner face at fault)."""
     topology, positions = embedding
-    inner_faces = renumber(
-        morton_codes(vertices),
-        vertices,
-        faces,
-        topology.inner_vertex,
-        topology.outer_vertex,
-        topology.outer_face,
-        positions,
-    )
+    inner_faces = renumber(morton_codes(vertices), vertices, faces, embedding)
     opposite, around = link_opposites(inner_faces, len(vertices))
     angles, pinched = np.empty(len(opposite)), np.zeros(len(inner_faces), np.uint8)
     face = fill_geometry(positions, inner_faces, topology.geometry, angles, pinched)
     if face >= 0:
         return Outcome.TOO_SHORT, face
     unfold_fans(inner_faces, opposite, angles, pinched, topology)
+    link(faces, inner_faces, opposite, around, pinched, topology)
+    return Outcome.FINISHED, -1
+
+
+@kernel
+def link(
+    faces: Ints, inner_faces: Ints, opposite: Ints, around: Ints, pinched: Flags, topology: Any
+) -> None:
+    """Fill links and components, and flag the corners of pinched faces."""
     across = crossings(inner_faces, opposite, pinched, topology.flags)
     fill_links(inner_faces, opposite, across, around, topology.links)
     label_components(faces, topology.component)
-    return Outcome.FINISHED, -1
 
 
 @kernel
@@ -573,24 +565,14 @@ def build_by_lengths(vertices: Floats, faces: Ints, lengths: Floats, embedding: 
 
     Length i of a face is that from its corner i to the next. Positions are carried along.
     """
-    topology, positions = embedding
-    inner_faces = renumber(
-        breadth_first_codes(faces, len(vertices)),
-        vertices,
-        faces,
-        topology.inner_vertex,
-        topology.outer_vertex,
-        topology.outer_face,
-        positions,
-    )
+    topology, _ = embedding
+    inner_faces = renumber(breadth_first_codes(faces, len(vertices)), vertices, faces, embedding)
     opposite, around = link_opposites(inner_faces, len(vertices))
     angles, pinched = np.empty(len(opposite)), np.zeros(len(inner_faces), np.uint8)
     own = lengths_of_half_edges(faces, lengths, inner_faces, topology)
     fill_geometry_by_lengths(own, inner_faces, topology.geometry, angles, pinched)
     unfold_fans(inner_faces, opposite, angles, pinched, topology)
-    across = crossings(inner_faces, opposite, pinched, topology.flags)
-    fill_links(inner_faces, opposite, across, around, topology.links)
-    label_components(faces, topology.component)
+    link(faces, inner_faces, opposite, around, pinched, topology)
 
 
 @kernel
