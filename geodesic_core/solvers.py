@@ -785,7 +785,7 @@ def _shortest_through(
 ) -> GeodesicPath:
     """Search for leg after leg, each no longer than the others leave of the limit."""
     legs: list[GeodesicPath] = []
-    positions = np.array([search.mesh.bounding_position(stop) for stop in control.watched(stops)])
+    positions = np.array([search.mesh.position_for_bounds(stop) for stop in control.watched(stops)])
     left = limit if len(stops) == 2 else limit * (1.0 + AT_LIMIT)  # sums of legs round
     for here, there in pairwise(stops):
         leg_control = control.for_part(len(legs), len(stops) - 1)

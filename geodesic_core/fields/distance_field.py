@@ -446,7 +446,7 @@ class DistanceField:
         >>> field.gradient.round(3).tolist()[1:]
         [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.707, 0.707, 0.0]]
         """
-        self.mesh.require_own_lengths("a gradient")
+        self.mesh.require_embedded("a gradient")
         winners = self._points.winners.get(Control())
         return gradient_at_vertices(self.mesh, winners, self._sweep.question.nodes)
 

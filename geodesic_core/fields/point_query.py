@@ -223,7 +223,7 @@ def find_nearest_source(
     # A vertex beyond the limit of the field is at least as far as that.
     rest = np.minimum(least[: len(mesh.vertices)], limit)
     pruning_bounds = pruning_toward(
-        mesh.bounding_positions, np.zeros(3), upper * (1.0 + SEARCH_SLACK), rest
+        mesh.positions_for_bounds, np.zeros(3), upper * (1.0 + SEARCH_SLACK), rest
     )
     wave = state.new_wavefront(mesh.topology, nodes.sites, pruned=True)
     control.check_memory(state.bytes_of(wave))

@@ -42,12 +42,12 @@ def transported(question: Question, angle: float, control: Control) -> Floats:
     sides, is_closed = np.where(vertices.mirrored, -1.0, 1.0), ~is_open(topology)
     for reached in _by_bends(bends, np.isfinite(leaving)):
         at = vertices.winner_ints[reached, PREDECESSOR]
-        aside = turns[at] - scales[at] * leaving[reached]  # of the way
+        offset = turns[at] - scales[at] * leaving[reached]  # from the direction of the leg
         vertex = np.minimum(at, count - 1)  # a source that is none has no way back
         fan = topology.total_angle[vertex], is_closed[vertex]
         straight = is_straight(arriving[at], leaving[reached], *fan)
-        aside[straight] = (turns[at] - scales[at] * arriving[at] - math.pi)[straight]
-        turns[reached] = scales[reached] * arriving[reached] + math.pi + sides[reached] * aside
+        offset[straight] = (turns[at] - scales[at] * arriving[at] - math.pi)[straight]
+        turns[reached] = scales[reached] * arriving[reached] + math.pi + sides[reached] * offset
     return _in_frames(mesh, turns[:count], scales[:count])
 
 

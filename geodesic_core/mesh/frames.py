@@ -133,7 +133,7 @@ def direction_of(mesh: TriangleMesh, point: SurfacePoint, vector: Floats) -> flo
     Radians in the frame of the point; NaN where its projection has no direction. Raises
     `InvalidArgument` where the surface is given by its lengths.
     """
-    mesh.require_own_lengths("a direction")
+    mesh.require_embedded("a direction")
     if point.vertex_index is not None:
         frames, v = mesh.tangent_frames(), point.vertex_index
         x_axis, y_axis, scale = frames.x_axes[v], frames.y_axes[v], float(frames.scales[v])

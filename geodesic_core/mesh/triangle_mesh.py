@@ -510,8 +510,8 @@ class TriangleMesh:
                 "TriangleMesh.from_lengths(faces, lengths, vertices)"
             )
 
-    def require_own_lengths(self, name: str) -> None:
-        """Refuse what needs positions at the distances of the surface's edges.
+    def require_embedded(self, name: str) -> None:
+        """Refuse what needs vertices whose distances are the lengths of the edges.
 
         Parameters
         ----------
@@ -525,7 +525,7 @@ class TriangleMesh:
 
         Examples
         --------
-        >>> gc.samples.plane(2).require_own_lengths("a gradient")
+        >>> gc.samples.plane(2).require_embedded("a gradient")
         """
         if self.lengths is not None:
             raise InvalidArgument(
@@ -534,12 +534,15 @@ class TriangleMesh:
             )
 
     @cached_property
-    def bounding_positions(self) -> Floats:
-        """(V, 3): `positions` where they bound distances from below; else 0, which always does."""
+    def positions_for_bounds(self) -> Floats:
+        """(V, 3): whose straight distances never exceed those on the surface.
+
+        That is `positions`; all 0 where lengths are given, which may be shorter.
+        """
         return self.positions if self.lengths is None else _frozen(np.zeros_like(self.positions))
 
-    def bounding_position(self, point: SurfacePoint) -> Floats:
-        """Return the position of a canonical point among `bounding_positions`.
+    def position_for_bounds(self, point: SurfacePoint) -> Floats:
+        """Return the position of a canonical point to compare with `positions_for_bounds`.
 
         Parameters
         ----------
@@ -554,7 +557,7 @@ class TriangleMesh:
         Examples
         --------
         >>> mesh = gc.samples.plane(2)
-        >>> mesh.bounding_position(mesh.point_on_edge(0, 1, 0.25)).tolist()
+        >>> mesh.position_for_bounds(mesh.point_on_edge(0, 1, 0.25)).tolist()
         [0.25, 0.0, 0.0]
         """
         return self.position_from_origin(point) if self.lengths is None else np.zeros(3)

@@ -44,7 +44,7 @@ class Landmarks:
         """Return the bounds of paths through a point, ``reaches`` away from its ``corners``."""
         least, most = np.zeros(LANDMARKS), np.zeros(LANDMARKS)
         bound_landmarks(self.distances, self.count, corners, reaches, least, most)
-        return pruning_toward(self.mesh.bounding_positions, position, limit)._replace(
+        return pruning_toward(self.mesh.positions_for_bounds, position, limit)._replace(
             landmarks=self.distances, landmark_count=self.count, least=least, most=most
         )
 
@@ -61,7 +61,7 @@ class Landmarks:
         component = mesh.components[topology.outer_vertex[beside]]
         candidates = topology.inner_vertex[mesh.components == component]
         if np.isinf(self._nearest[beside]):  # the first here: far from somewhere, at least
-            apart = mesh.bounding_positions[candidates] - mesh.bounding_positions[beside]
+            apart = mesh.positions_for_bounds[candidates] - mesh.positions_for_bounds[beside]
             chosen = candidates[np.argmax(np.einsum("vk,vk->v", apart, apart))]
         else:
             chosen = candidates[np.argmax(self._nearest[candidates])]

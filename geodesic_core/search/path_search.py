@@ -187,7 +187,7 @@ class PathSearch:
         first, last = leg.start.nearest_corner, leg.end.nearest_corner
         beside = float(leg.start.reaches.min() + leg.end.reaches.min())
         corner = (
-            self.mesh.bounding_positions[first].copy(),
+            self.mesh.positions_for_bounds[first].copy(),
             np.array([first], np.int32),
             np.zeros(1),
         )
@@ -274,7 +274,7 @@ class _End:
 
     def __init__(self, mesh: TriangleMesh, point: SurfacePoint) -> None:
         self.point = point
-        self.position: Floats = mesh.bounding_position(point)
+        self.position: Floats = mesh.position_for_bounds(point)
         self.corners, self.reaches = corners_of(mesh, point)
 
     @property
