@@ -211,8 +211,6 @@ class Settings(BaseSettings):
     """Requests of a caller that may run at the same time."""
     quota_bytes: PositiveInt | None = None
     """Size of the meshes that a caller was the first to store; without keys, of all callers."""
-    quota_jobs: PositiveInt | None = None
-    """Jobs of a caller, until they are removed; without keys, of all callers together."""
     quota_results_bytes: PositiveInt | None = Field(default_factory=_quota_results)
     """Size of the answers to a caller's jobs; by default half of all, and all without keys."""
     quota_uploads: PositiveInt | None = None

@@ -6,7 +6,6 @@ are when they are first seen; from then on a clock counts that nobody can set.
 
 from collections.abc import Iterable
 from datetime import UTC, datetime
-from math import ceil
 from time import monotonic
 from typing import NamedTuple
 
@@ -63,10 +62,3 @@ class Retention:
         """Return the ids of the jobs that are to be removed by now."""
         now = monotonic()
         return [job_id for job_id, job in self._finished.items() if job.due <= now]
-
-    def seconds_to_first(self, owner: str | None) -> int | None:
-        """Return the seconds until a job of an owner is removed; None where none has finished."""
-        first = min(
-            (job.due for job in self._finished.values() if job.owner == owner), default=None
-        )
-        return None if first is None else max(1, ceil(first - monotonic()))

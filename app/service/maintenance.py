@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from app.errors import ProblemError
-from app.jobs import Job, read_jobs, read_shared_jobs
+from app.jobs import Job, read_jobs
 from app.settings import variable_of
-from app.state import StateError, require_intact
+from app.state import Database, StateError, require_intact
 from app.store.fields import code_of_field, field_files
 from app.store.folder import Folder
 from app.store.layout import (
@@ -86,7 +86,8 @@ def jobs_of(root: Path, state: str | None) -> list[Job]:
     StoreError
         The store's own database is damaged.
     """
-    jobs, service = read_jobs(root / JOB_DATABASE), noted_state(root)
+    path, service = root / JOB_DATABASE, noted_state(root)
+    jobs = read_jobs(Database(path))
     if state is None:
         if service is not None:
             raise StateError(
@@ -94,8 +95,9 @@ def jobs_of(root: Path, state: str | None) -> list[Job]:
                 f"database as --state or {variable_of('state')}, since it holds their jobs"
             )
         return jobs
-    name, shared_jobs = read_shared_jobs(state)
-    if service not in (None, name):
+    shared = Database(path, state)
+    shared_jobs = read_jobs(shared)
+    if service not in (None, shared.service):
         raise StateError(
             f"the services of the store {root} share another database than the given one"
         )

@@ -27,7 +27,7 @@ from app.service.request_context import RequestContext
 from app.service.resources import share_arenas
 from app.service.time_limit import time_limit
 from app.settings import Settings
-from app.state import Allowances, Database, MeshRecords, database_of
+from app.state import Allowances, Database, MeshRecords
 from app.store import layout
 from app.store.choice import store_of
 from app.store.fields import FieldStore
@@ -89,7 +89,7 @@ class Service:
         """What callers have taken, where several services count together"""
         repository, ttl_s = JobRepository(self.database), settings.job_ttl
         retention = Retention(self.results, ttl_s)
-        self.jobs = JobManager(repository, self.results, retention, settings.quota_jobs)
+        self.jobs = JobManager(repository, self.results, retention)
         self.answering = Answering(
             settings,
             self.mesh_catalog,
@@ -119,7 +119,7 @@ class Service:
             self.results.prepare()
             if share.is_first:
                 self.fields.prepare(self.mesh_catalog.ids)
-            async with self._open_database(share):
+            async with self._using_database(share):
                 await self.engine.start()
                 # Objects of the start live for ever; each full collection over them takes 90 ms.
                 collect()
@@ -168,9 +168,8 @@ class Service:
             yield share
 
     @asynccontextmanager
-    async def _open_database(self, share: Share) -> AsyncIterator[None]:
-        """Open the database inside the block; keep the catalogue up with other services there."""
-        await self.database.open()
+    async def _using_database(self, share: Share) -> AsyncIterator[None]:
+        """Use the database inside the block; keep the catalogue up with other services there."""
         following = None
         try:
             if self.database.is_shared:
@@ -186,7 +185,7 @@ class Service:
             if following is not None:
                 following.cancel()
                 await asyncio.wait({following})
-            await self.database.close()
+            await self.database.aclose()
 
     def announce_end(self) -> None:
         """Say that the service is not ready, so that no new clients are sent to it."""
@@ -290,4 +289,4 @@ def _engine(settings: Settings, store: Store) -> Engine:
 
 def _database_of(settings: Settings) -> Database:
     url = settings.state.get_secret_value() if settings.state else None
-    return database_of(settings.folder / layout.JOB_DATABASE, url)
+    return Database(settings.folder / layout.JOB_DATABASE, url)

@@ -6,8 +6,12 @@ from contextlib import asynccontextmanager, suppress
 from math import ceil
 from uuid import uuid4
 
+from sqlalchemy import delete, func, insert, select
+from sqlalchemy.dialects import postgresql
+
 from app.errors import StateUnavailableError
 from app.state.database import Database
+from app.state.schema import CLOCK, rates, work
 
 _MINUTE_S = 60.0
 _PURGE_EVERY = 1000
@@ -15,7 +19,7 @@ _PURGE_EVERY = 1000
 
 
 class Allowances:
-    """What each caller has taken of its allowances, in ``database``.
+    """What each caller has taken of its allowances, in a ``database`` that services share.
 
     A rate is the time at which the last event would come if events came evenly, by the clock of the
     database (the generic cell rate algorithm). Work has a row, which counts for ``longest_s``
@@ -32,26 +36,20 @@ class Allowances:
 
         As many may come at once.
         """
-        now, interval = self._database.clock, _MINUTE_S / limit
-        counted = await self._database.rows(
-            f"INSERT INTO rates VALUES (?, {now} + CAST(? AS DOUBLE PRECISION)) "  # noqa: S608 - no value
-            "ON CONFLICT (caller) DO UPDATE SET due = CAST(? AS DOUBLE PRECISION) + "
-            f"CASE WHEN rates.due > {now} THEN rates.due ELSE {now} END "
-            f"WHERE rates.due <= {now} + CAST(? AS DOUBLE PRECISION) RETURNING caller",
-            caller,
-            interval,
-            interval,
-            _MINUTE_S - interval + 1e-6,
-        )
+        interval = _MINUTE_S / limit
+        ahead_s = _MINUTE_S - interval
+        first = postgresql.insert(rates).values(caller=caller, due=CLOCK + interval)
+        event = first.on_conflict_do_update(
+            index_elements=[rates.c.caller],
+            set_={"due": func.greatest(rates.c.due, CLOCK) + interval},
+            where=rates.c.due <= CLOCK + ahead_s + 1e-6,
+        ).returning(rates.c.caller)
+        wait = select(rates.c.due - CLOCK - ahead_s).where(rates.c.caller == caller)
+        async with self._database.transaction() as connection:
+            is_counted = await connection.scalar(event) is not None
+            wait_s = 0.0 if is_counted else await connection.scalar(wait)
         await self._purge_sometimes()
-        if counted:
-            return 0
-        rows = await self._database.rows(
-            f"SELECT due - {now} FROM rates WHERE caller = ?",  # noqa: S608 - no value
-            caller,
-        )
-        ahead = float(rows[0][0]) if rows else 0.0
-        return max(1, ceil(ahead + interval - _MINUTE_S))
+        return 0 if is_counted else max(1, ceil(wait_s or 0.0))
 
     @asynccontextmanager
     async def counting(self, kind: str, caller: str, limit: int) -> AsyncIterator[int]:
@@ -59,30 +57,27 @@ class Allowances:
 
         Beyond ``limit`` it is not counted.
         """
-        work, now = uuid4().hex, self._database.clock
-        async with self._database.alone(f"work {kind} {caller}") as statements:
-            ((running,),) = await statements.rows(
-                f"SELECT COUNT(*) + 1 FROM work WHERE kind = ? AND caller = ? AND ends > {now}",  # noqa: S608 - no value
-                kind,
-                caller,
-            )
+        row = {"id": uuid4().hex, "kind": kind, "caller": caller, "ends": CLOCK + self._longest_s}
+        others = select(func.count()).where(
+            work.c.kind == kind, work.c.caller == caller, work.c.ends > CLOCK
+        )
+        async with self._database.transaction(f"work {kind} {caller}") as connection:
+            running = (await connection.execute(others)).scalar_one() + 1
             if running <= limit:
-                await statements.run(
-                    f"INSERT INTO work VALUES (?, ?, ?, {now} + CAST(? AS DOUBLE PRECISION))",  # noqa: S608 - no value
-                    work,
-                    kind,
-                    caller,
-                    self._longest_s,
-                )
+                await connection.execute(insert(work).values(row))
         try:
-            yield int(running)
+            yield running
         finally:
             with suppress(StateUnavailableError):  # it counts no longer than its time
-                await asyncio.shield(self._database.run("DELETE FROM work WHERE id = ?", work))
+                await asyncio.shield(self._forget(row["id"]))
+
+    async def _forget(self, work_id: object) -> None:
+        async with self._database.transaction() as connection:
+            await connection.execute(delete(work).where(work.c.id == work_id))
 
     async def _purge_sometimes(self) -> None:
         self._events += 1
         if self._events % _PURGE_EVERY == 0:
-            clock = self._database.clock
-            await self._database.run(f"DELETE FROM rates WHERE due < {clock}")  # noqa: S608 - no value
-            await self._database.run(f"DELETE FROM work WHERE ends < {clock}")  # noqa: S608 - no value
+            async with self._database.transaction() as connection:
+                await connection.execute(delete(rates).where(rates.c.due < CLOCK))
+                await connection.execute(delete(work).where(work.c.ends < CLOCK))

@@ -2,7 +2,7 @@
 
 import errno
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
 from itertools import count
@@ -15,7 +15,7 @@ from starlette.testclient import TestClient
 from app.jobs import Job, read_jobs
 from app.jobs.repository import JobRepository
 from app.jobs.retention import Retention
-from app.state import SqliteDatabase
+from app.state import Database
 from tests.support.clocks import TEN_YEARS, Calendar, Clock
 from tests.support.processes import stopped
 from tests.support.service import (
@@ -513,50 +513,11 @@ def test_the_end_of_a_job_is_recorded_once_the_disk_can_be_written(
     with serving(tmp_path) as client:
         job = job_of(submit(client, upload_sample(client, "plane", 50)))
         wait_until(lambda: refused)
-        assert {stored.status for stored in read_jobs(tmp_path / "jobs.sqlite3")} == {"accepted"}
+        (stored,) = read_jobs(Database(tmp_path / "jobs.sqlite3"))
+        assert stored.status == "accepted"
         is_read_only = False
         wait_for(client, job, "successful")
         assert client.get(f"{job}/results").status_code == 200
-
-
-@pytest.fixture
-def full_disk(monkeypatch: pytest.MonkeyPatch) -> Callable[[Path], None]:
-    """Fill the disk of a store, as its records of jobs see it, up to their reserve."""
-    run = SqliteDatabase._run
-
-    def fill(store: Path) -> None:
-        async def run_if_there_is_room(database: SqliteDatabase, sql: str, *values: Any) -> int:
-            if not sql.startswith("PRAGMA") and (store / "jobs.reserve").exists():
-                raise OSError(errno.ENOSPC, "database or disk is full")
-            return await run(database, sql, *values)
-
-        monkeypatch.setattr(SqliteDatabase, "_run", run_if_there_is_room)
-
-    return fill
-
-
-def test_jobs_are_dismissed_although_the_disk_is_full(
-    tmp_path: Path, full_disk: Callable[[Path], None], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with serving(tmp_path, cancel_grace_s=LONG_S) as client:
-        mesh_id = upload_sample(client, "plane", 50)
-        finished = [job_of(submit(client, mesh_id)) for _ in range(3)]
-        for job in finished:
-            wait_for(client, job, "successful")
-        with stopped(client.workers()):
-            running = job_of(submit(client, mesh_id))
-            full_disk(tmp_path)
-
-            for job in finished:
-                assert client.delete(job).status_code == 200
-                check_problem(client.get(job), 404, "job_not_found")
-            assert client.post(f"{running}/cancel").json()["status"] == "dismissed"
-            check_problem(submit(client, mesh_id), 507, "storage_full")
-    monkeypatch.undo()
-    with serving(tmp_path) as client:
-        (left,) = client.get("/v1/jobs").json()["jobs"]
-        assert f"/v1/jobs/{left['id']}" == running
-        assert left["status"] == "dismissed"
 
 
 def test_answers_of_jobs_outlive_those_that_are_only_kept(tmp_path: Path) -> None:

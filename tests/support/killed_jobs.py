@@ -32,6 +32,7 @@ from app.service.maintenance import inspect, jobs_of, leftovers
 from app.service.request_context import RequestContext
 from app.service.service import Service
 from app.settings import Settings
+from app.state import Database
 from tests.support.direct_engine import DirectEngine
 from tests.support.killing import Killer, in_child
 from tests.support.service import store_mesh
@@ -50,6 +51,7 @@ class Store:
     def __init__(self, root: Path, mesh_id: str) -> None:
         self.root = root
         self.mesh_id = mesh_id
+        self.database = Database(root / "jobs.sqlite3")
         self._told = root.with_suffix(".told")
 
     def tell(self, job_id: str, what: str) -> None:
@@ -86,7 +88,7 @@ class Store:
             yield service, engine
 
     async def until_running_is_recorded(self) -> None:
-        while not any(job.status == "running" for job in read_jobs(self.root / "jobs.sqlite3")):
+        while not any(job.status == "running" for job in read_jobs(self.database)):
             await asyncio.sleep(0)
 
     def query(self, media_type: str) -> DistancesQuery:
@@ -221,7 +223,7 @@ def kill_by_a_job(store: Store) -> None:
     versions = []
     for _ in range(3):
         assert in_child(lambda: asyncio.run(die_of_a_job(store))) == KILLED
-        fatal, other = read_jobs(store.root / "jobs.sqlite3")
+        fatal, other = read_jobs(store.database)
         statuses = fatal.status, other.status
         assert statuses == ("running", "accepted"), statuses
         assert [fatal.id, other.id] == list(store.told())

@@ -40,7 +40,6 @@ _LIMITS = (
     "rate_limit",
     "max_concurrent",
     "quota_bytes",
-    "quota_jobs",
     "quota_results_bytes",
     "quota_uploads",
 )

@@ -60,7 +60,6 @@ def test_a_clock_that_is_moved_changes_nothing(
     after = finished_job()
     jobs.add(EndedJob.of(after))
 
-    assert jobs.seconds_to_first(None) == 3000
     clock.now += 2999
     assert jobs.due() == []
     clock.now += 1
@@ -88,28 +87,8 @@ def test_what_finished_before_the_start(clock: Clock, calendar: Calendar) -> Non
     assert jobs.due() == [old.id, younger.id]
     jobs.keep_up([EndedJob.of(to_come)])
     assert pins == {"a result": 1}
-    assert jobs.seconds_to_first(None) == 2999
     clock.now += 2999
     assert jobs.due() == [to_come.id]
-
-
-def test_the_first_job_of_each_owner(clock: Clock) -> None:
-    jobs = retention_of(Pins())
-    assert jobs.seconds_to_first("alice") is None
-    first = finished_job("alice")
-    jobs.add(EndedJob.of(first))
-    clock.now += 0.5
-    for owner in ("alice", "bob", None):
-        jobs.add(EndedJob.of(finished_job(owner)))
-
-    assert jobs.seconds_to_first("alice") == jobs.seconds_to_first("bob") == 3600
-    clock.now += 100
-    assert jobs.seconds_to_first("alice") == 3500
-    assert jobs.seconds_to_first("carol") is None
-    jobs.discard(first.id)
-    assert jobs.seconds_to_first("alice") == 3500
-    clock.now += 2 * HOUR_S
-    assert jobs.seconds_to_first("alice") == 1, "it is about to be removed"
 
 
 @pytest.mark.parametrize("moved", [TEN_YEARS, -TEN_YEARS])

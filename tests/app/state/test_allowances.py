@@ -1,55 +1,65 @@
-"""Allowances that several replicas count together, on both databases."""
+"""Allowances that several replicas count together."""
 
-from collections.abc import Awaitable, Callable
 from contextlib import AsyncExitStack
 
 import anyio
 import pytest
+from sqlalchemy import select, update
 
 from app.state import Allowances, Database
-from tests.support.databases import opened
+from app.state.schema import rates, work
+
+pytestmark = [
+    pytest.mark.anyio,
+    pytest.mark.parametrize("state_url", ["postgresql"], indirect=True),
+    pytest.mark.service,
+]
 
 HOUR_S = 3600.0
 
+Pair = tuple[Allowances, Allowances]
 
-def pair(database: Database) -> tuple[Allowances, Allowances]:
+
+@pytest.fixture
+def pair(database: Database) -> Pair:
     return Allowances(database, HOUR_S), Allowances(database, HOUR_S)
 
 
-async def share_a_rate(database: Database) -> None:
-    first, second = pair(database)
-    waits = [await each.seconds_over("alice", 4) for each in (first, second) * 2]
-    assert waits == [0] * 4
-    assert 1 <= await first.seconds_over("alice", 4) <= 15
-    assert 1 <= await second.seconds_over("alice", 4) <= 15
-    assert await second.seconds_over("bob", 4) == 0
-    # As if fifteen seconds had passed: one more is free.
-    await database.run("UPDATE rates SET due = due - 15.0 WHERE caller = ?", "alice")
-    assert await second.seconds_over("alice", 4) == 0
-    await database.run("UPDATE rates SET due = due - 3600.0 WHERE caller = ?", "alice")
-    waits = [await each.seconds_over("alice", 4) for each in (first, second) * 2]
-    assert waits == [0] * 4
+async def test_a_rate_is_shared(database: Database, pair: Pair) -> None:
+    async def pass_time(seconds: float) -> None:
+        change = update(rates).where(rates.c.caller == "alice").values(due=rates.c.due - seconds)
+        async with database.transaction() as connection:
+            await connection.execute(change)
+
+    first, second = pair
+    for _ in range(2):
+        waits = [await each.seconds_over("alice", 4) for each in pair * 2]
+        assert waits == [0] * 4
+        assert 1 <= await first.seconds_over("alice", 4) <= 15
+        assert 1 <= await second.seconds_over("alice", 4) <= 15
+        assert await second.seconds_over("bob", 4) == 0
+        await pass_time(15.0)
+        assert await second.seconds_over("alice", 4) == 0
+        await pass_time(HOUR_S)
 
 
-async def count_at_once(database: Database) -> None:
+async def test_a_rate_is_counted_at_once(pair: Pair) -> None:
     admitted = []
-    first, second = pair(database)
 
     async def ask(allowances: Allowances) -> None:
         admitted.append(await allowances.seconds_over("alice", 5) == 0)
 
     async with anyio.create_task_group() as tasks:
-        for _ in range(6):
-            tasks.start_soon(ask, first)
-            tasks.start_soon(ask, second)
+        for allowances in pair * 6:
+            tasks.start_soon(ask, allowances)
     assert admitted.count(True) == 5
 
 
-async def share_concurrency(database: Database) -> None:
+async def test_concurrency_is_shared(database: Database, pair: Pair) -> None:
     async def counted(allowances: Allowances, kind: str, caller: str) -> int:
         return await stack.enter_async_context(allowances.counting(kind, caller, 2))
 
-    first, second = pair(database)
+    first, second = pair
     async with AsyncExitStack() as stack:
         async with first.counting("requests", "alice", 2) as running:
             assert running == 1
@@ -59,15 +69,8 @@ async def share_concurrency(database: Database) -> None:
             assert await counted(first, "uploads", "alice") == 1
         assert await counted(second, "requests", "alice") == 2
         assert await counted(first, "requests", "alice") == 3
-        await database.run("UPDATE work SET ends = ends - 3600.0")
+        async with database.transaction() as connection:
+            await connection.execute(update(work).values(ends=work.c.ends - HOUR_S))
         assert await counted(first, "requests", "alice") == 1, "a service died long ago"
-    assert await database.rows("SELECT * FROM work") == []
-
-
-@pytest.mark.parametrize("check", [share_a_rate, count_at_once, share_concurrency])
-def test_allowances(database: Database, check: Callable[[Database], Awaitable[None]]) -> None:
-    async def check_opened() -> None:
-        async with opened(database):
-            await check(database)
-
-    anyio.run(check_opened)
+    async with database.transaction() as connection:
+        assert (await connection.execute(select(work))).all() == []
