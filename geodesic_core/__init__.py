@@ -19,9 +19,10 @@ from geodesic_core.control import Control
 from geodesic_core.errors import GeodesicError
 from geodesic_core.fields.borders import Border
 from geodesic_core.fields.distance_field import DistanceField
-from geodesic_core.fields.isolines import Isoline, resolve_chord_error, spaced_levels
+from geodesic_core.fields.isolines import resolve_chord_error, spaced_levels
 from geodesic_core.fields.log_map import LogMap, Polar
 from geodesic_core.fields.path import ErrorBound, GeodesicPath, SearchStep
+from geodesic_core.fields.scalar_field import ScalarField
 from geodesic_core.fields.stored_field import load_field
 from geodesic_core.fields.straight_lines import StraightLine
 from geodesic_core.fields.sweep_result import Retain, SweepStats
@@ -33,6 +34,7 @@ from geodesic_core.matrices.matrix_parts import MatrixParts
 from geodesic_core.mesh.barriers import walled_in
 from geodesic_core.mesh.curve import share_a_face
 from geodesic_core.mesh.report import MeshReport, Sample
+from geodesic_core.mesh.surface_curve import SurfaceCurve
 from geodesic_core.mesh.surface_point import Curve, Source, SurfacePoint
 from geodesic_core.mesh.tangent_frames import TangentFrames
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -61,7 +63,6 @@ __all__ = [
     "ErrorBound",
     "GeodesicError",
     "GeodesicPath",
-    "Isoline",
     "LogMap",
     "MatrixFile",
     "MatrixParts",
@@ -70,10 +71,12 @@ __all__ = [
     "Polar",
     "Retain",
     "Sample",
+    "ScalarField",
     "SearchStep",
     "Solver",
     "Source",
     "StraightLine",
+    "SurfaceCurve",
     "SurfacePoint",
     "SweepStats",
     "TangentFrames",

@@ -18,7 +18,7 @@ from geodesic_core.errors import NoPath
 from geodesic_core.fields.distance_field import DistanceField, solve
 from geodesic_core.fields.log_map import LogMap, log_map_of
 from geodesic_core.fields.methods import Effort, Method, promise_of, sweep_of
-from geodesic_core.fields.path import ErrorBound, GeodesicPath, joined, length_of
+from geodesic_core.fields.path import ErrorBound, GeodesicPath, joined
 from geodesic_core.fields.question import Question
 from geodesic_core.fields.sources import component_of, disconnected, each_of
 from geodesic_core.fields.straight_lines import (
@@ -33,7 +33,8 @@ from geodesic_core.io.as_mesh import MeshLike, as_mesh
 from geodesic_core.kernels.jit.cache import sources_digest
 from geodesic_core.matrices.matrix import Layout, find_matrix
 from geodesic_core.mesh.barriers import with_barriers
-from geodesic_core.mesh.surface_point import Point, Points, Sources, SurfacePoint
+from geodesic_core.mesh.surface_curve import Sources, length_of
+from geodesic_core.mesh.surface_point import Point, Points, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.nearest import Nearest, find_nearest
 from geodesic_core.search.path_search import PathSearch

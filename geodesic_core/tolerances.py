@@ -248,6 +248,12 @@ ROUNDED_COORDINATE = 2.0**-50
 The positions of a georeferenced mesh round by more than `SNAP`: at 5e6 from the origin, by 1e-9.
 """
 
+SAME_HEIGHT = 1e-9
+"""Share of its extent up to which two heights of a surface above one place are one: rounding.
+
+Faces that meet at the place are both found there.
+"""
+
 NEARLY_JOINED = 1e-3
 """Share of its height up to which a border vertex counts as nearly joined to another border.
 

@@ -120,6 +120,6 @@ class IsolinesQuery(FromSources[IsolinesRequest]):
         return [float(level) for level in levels]
 
 
-def describe_level(level: float, lines: Sequence[gc.Isoline]) -> dict[str, Any]:
+def describe_level(level: float, lines: Sequence[gc.SurfaceCurve]) -> dict[str, Any]:
     """Return the members of a level."""
     return {"level": level, "lines": [describe_line(line) for line in lines]}

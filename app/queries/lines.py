@@ -21,7 +21,7 @@ def resolved_chord_error(mesh: gc.TriangleMesh, chord_error: float | None) -> fl
         raise invalid_fields(["/chord_error"], str(error)) from None
 
 
-def describe_line(line: gc.Isoline | gc.Border) -> dict[str, Any]:
+def describe_line(line: gc.SurfaceCurve) -> dict[str, Any]:
     """Return the members that every line has."""
     return {
         "closed": line.closed,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats, Ints, Longs
-from geodesic_core.kernels.mesh.build import count_boundary_loops
+from geodesic_core.kernels.mesh.build import trace_boundary
 from geodesic_core.kernels.mesh.half_edges import (
     BOUNDARY,
     FANS,
@@ -205,7 +205,7 @@ def report_of(
         triangulated_polygons=int(np.count_nonzero(polygons > 1)),
         components=len(lowest),
         component_vertices=Sample.of(np.sort(lowest)),
-        boundary_loops=int(count_boundary_loops(topology.links)),
+        boundary_loops=len(trace_boundary(topology.links)[1]) - 1,
         euler_characteristic=len(used) - len(edges) + len(surface),
         saddle_vertices=int(np.count_nonzero(flags & SADDLE)),
         boundary_vertices=int(np.count_nonzero(flags & BOUNDARY)),

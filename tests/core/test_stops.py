@@ -131,7 +131,7 @@ def bits(found: Any) -> Any:
         return [*map(bits, (found.distances, found.angles, found.bends))]
     if isinstance(found, gc.GeodesicPath):
         return answer(found)
-    if isinstance(found, gc.Isoline | gc.Border | gc.Nearest):
+    if isinstance(found, gc.SurfaceCurve | gc.Nearest):
         return [bits(part) for part in vars_of(found)]
     if isinstance(found, list | tuple):
         return [bits(part) for part in found]
