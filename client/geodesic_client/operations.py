@@ -466,8 +466,8 @@ def trace(
 ) -> Flow[list[StraightLine]]:
     """Return the straightest lines from some points in some directions, for some lengths.
 
-    A direction is an angle, in radians, or a vector in space. Of starts, directions and lengths
-    there is one for all lines, or one for each.
+    Directions are angles (N,), in radians, or vectors in space (N, 3). Of starts, directions and
+    lengths there is one for all lines, or one for each.
     """
     given = np.asarray(directions, np.float64)
     body = _body(
