@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from geodesic_core import plotting
 from geodesic_core.arrays import Floats, Ints, Longs
-from geodesic_core.errors import InvalidArgument
+from geodesic_core.errors import InvalidArgument, NotEmbedded
 from geodesic_core.kernels.curves.chains import Lines
 from geodesic_core.kernels.curves.line_points import locate_lines
 from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL
@@ -68,11 +68,11 @@ class SurfaceCurve:
 
         Raises
         ------
-        InvalidArgument
+        NotEmbedded
             The mesh is given by lengths alone: use `locations`.
         """
         if np.isnan(self._located.points[:1, 0]).any():
-            raise InvalidArgument(
+            raise NotEmbedded(
                 "the curve has no positions in space, as its mesh has lengths alone: use locations"
             )
         return self._located.points
