@@ -1,4 +1,4 @@
-"""What all curves have in common, and boundaries."""
+"""Curves of every kind have the same answers; boundaries are the edges of one face."""
 
 import copy
 import csv
