@@ -1,0 +1,71 @@
+"""Curves to cut along, all as the same arrays."""
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from geodesic_core.arrays import Floats, Longs
+from geodesic_core.control import Control
+from geodesic_core.errors import InvalidArgument
+from geodesic_core.fields.path import GeodesicPath
+from geodesic_core.mesh.curve import polyline_of, weights_by_face
+from geodesic_core.mesh.surface_point import Curve, SurfacePoint
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
+
+
+class Line(NamedTuple):
+    """A polyline of K points, each of whose segments lies in a face; in the caller's numbers."""
+
+    location_faces: Longs
+    """(K,): a face that holds each point"""
+    location_weights: Floats
+    """(K, 3): weights in it"""
+    faces: Longs
+    """(K - 1,), or (K,) if closed: the face that holds the segment from each point to the next"""
+    closed: bool
+    """Whether a segment leads from the last point to the first"""
+
+
+def as_line(mesh: TriangleMesh, curve: object, name: str, control: Control) -> Line:
+    """Return a curve as a line; ``name`` is how messages call it.
+
+    Raises
+    ------
+    InvalidArgument
+        It is no curve, or that of another mesh.
+    InvalidPoint
+        One of its points is not on the mesh, or shares no face with the next.
+    Cancelled, DeadlineExceeded
+        As the control says.
+    """
+    if isinstance(curve, GeodesicPath):
+        if curve.mesh is not None and not _has_faces_of(curve.mesh, mesh):
+            raise InvalidArgument(f"{name} is a path on another mesh: it has other faces")
+        return Line(
+            curve._location_faces.astype(np.int64),
+            curve._location_weights,
+            curve.faces.astype(np.int64),
+            closed=False,
+        )
+    if isinstance(curve, Curve):
+        points = polyline_of(mesh, curve, name, control)
+        between = [_shared_face(mesh, *ends) for ends in control.watched(pairwise(points))]
+        return Line(
+            np.array([point.face_index for point in points], np.int64),
+            np.array([point.barycentric for point in points]),
+            np.array(between, np.int64),
+            closed=False,
+        )
+    raise InvalidArgument(f"{name} is {curve!r}; it must be a Curve or a GeodesicPath")
+
+
+def _has_faces_of(mesh: TriangleMesh, other: TriangleMesh) -> bool:
+    return mesh is other or np.array_equal(mesh.faces, other.faces)
+
+
+def _shared_face(mesh: TriangleMesh, start: SurfacePoint, end: SurfacePoint) -> int:
+    if start == end:
+        return start.face_index
+    shared = weights_by_face(mesh, start).keys() & weights_by_face(mesh, end)
+    return min(mesh.topology.outer_face[list(shared)].tolist())
