@@ -45,7 +45,7 @@ def cut_along(
     """Return the mesh cut along lines, one or more."""
     control.check_memory(2 * (mesh.vertices.nbytes + 2 * mesh.faces.nbytes))
     around = surroundings_of(mesh, lines)
-    points, edge_points = points_of(around, lines)
+    points, edge_points = points_of(mesh, around, lines)
     shapes = shapes_of(sides_of(mesh, around.faces)) / STEPS
     segments = segments_of(around, lines)
     children = retriangulated(
@@ -146,17 +146,14 @@ def _with_middles(mesh: TriangleMesh, joined: Joined, edges: Longs) -> Joined:
     """Return a cut mesh with a vertex in the middle of some edges of curves, lower end first."""
     first = len(mesh.vertices) + len(joined.locations.faces)
     faces, face_of = halved(joined.faces, joined.face_of, edges, first)
-    middles = first + np.arange(len(edges))
-    corner = np.flatnonzero(np.isin(faces, middles).any(axis=1))
-    old_face = np.empty(len(edges), np.int64)
-    for column in range(3):
-        rows = corner[faces[corner, column] >= first]
-        old_face[faces[rows, column] - first] = face_of[rows]
+    middles, old_face = first + np.arange(len(edges)), np.empty(len(edges), np.int64)
+    rows, columns = np.nonzero(faces >= first)
+    old_face[faces[rows, columns] - first] = face_of[rows]
     ends = [weights_in(joined.locations, mesh.faces, end, old_face) for end in edges.T]
     locations = joined.locations.joined(old_face, _middle_of(*ends))
     owned = joined.curve_edges[joined.edge_curves[:, 0]]
     place = np.searchsorted(keys_of(edges), keys_of(owned)).clip(max=len(edges) - 1)
-    is_halved = (edges[place] == owned).all(axis=1)
+    is_halved = keys_of(edges)[place] == keys_of(owned)
     curves, middle = joined.edge_curves[:, 1], middles[place[is_halved]]
     halves = [np.stack([end, middle], axis=1) for end in owned[is_halved].T]
     pieces = np.concatenate([owned[~is_halved], *halves])

@@ -59,14 +59,14 @@ class CutMesh:
             mesh = TriangleMesh(self.vertices, self.faces)
         else:
             vertices = self.vertices if self.old.has_positions else None
-            mesh = TriangleMesh.from_lengths(self.faces, self._lengths(), vertices)
+            lengths = self._lengths(self.old.lengths)
+            mesh = TriangleMesh.from_lengths(self.faces, lengths, vertices)
         blocked = np.flatnonzero(np.isin(self.face_of, self.old.barriers))
         return mesh.with_barriers(blocked) if len(blocked) else mesh
 
-    def _lengths(self) -> Floats:
+    def _lengths(self, old_lengths: Floats) -> Floats:
         """Return the lengths of edges within the old faces, (F', 3)."""
-        assert self.old.lengths is not None
-        lengths = self.old.lengths[self.face_of].copy()
+        lengths = old_lengths[self.face_of]
         sizes = np.bincount(self.face_of, minlength=len(self.old.faces))
         rows = np.flatnonzero(sizes[self.face_of] > 1)
         sides = sides_of(self.old, self.face_of[rows])
@@ -250,7 +250,7 @@ class CutMesh:
         return array[self.face_of] if chosen == ["faces"] else self._interpolated(array)
 
     def _interpolated(self, values: NDArray[Any]) -> Any:
-        """Return values of old vertices for new ones; a corner of no weight has no say, also NaN."""
+        """Return values of old vertices for new ones; NaN at a corner of no weight has no say."""
         weights = self._locations.weights.reshape(-1, 3, *[1] * (values.ndim - 1))
         at_corners = values[self.old.faces[self._locations.faces]]
         parts = np.where(weights > 0.0, weights * at_corners, 0.0)

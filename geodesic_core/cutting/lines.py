@@ -7,7 +7,7 @@ import numpy as np
 
 from geodesic_core.arrays import Floats, Longs
 from geodesic_core.control import Control
-from geodesic_core.errors import InvalidArgument
+from geodesic_core.errors import InvalidArgument, InvalidPoint
 from geodesic_core.fields.path import GeodesicPath
 from geodesic_core.mesh.curve import polyline_of, weights_by_face
 from geodesic_core.mesh.surface_point import Curve, SurfacePoint
@@ -39,6 +39,14 @@ def as_line(mesh: TriangleMesh, curve: object, name: str, control: Control) -> L
     Cancelled, DeadlineExceeded
         As the control says.
     """
+    line = _line_of(mesh, curve, name, control)
+    is_placed = (line.location_faces >= 0) & (line.location_faces < len(mesh.faces))
+    if not is_placed.all():
+        raise InvalidPoint(f"point {is_placed.argmin()} of {name} is in no face of the mesh")
+    return line
+
+
+def _line_of(mesh: TriangleMesh, curve: object, name: str, control: Control) -> Line:
     if isinstance(curve, GeodesicPath):
         if curve.mesh is not None and not _has_faces_of(curve.mesh, mesh):
             raise InvalidArgument(f"{name} is a path on another mesh: it has other faces")
@@ -68,4 +76,4 @@ def _shared_face(mesh: TriangleMesh, start: SurfacePoint, end: SurfacePoint) -> 
     if start == end:
         return start.face_index
     shared = weights_by_face(mesh, start).keys() & weights_by_face(mesh, end)
-    return min(mesh.topology.outer_face[list(shared)].tolist())
+    return int(mesh.topology.outer_face[list(shared)].min())

@@ -28,7 +28,7 @@ def weights_in(locations: Locations, old_faces: Ints, vertices: Longs, faces: Lo
     """Return the weights of vertices in old faces that hold them, (N, 3)."""
     is_new = vertices >= locations.first
     corners = old_faces[faces]
-    weights = (corners == vertices[:, None]).astype(np.float64)
+    weights: Floats = (corners == vertices[:, None]).astype(np.float64)
     new = vertices[is_new] - locations.first
     given = old_faces[locations.faces[new]]
     same = given[:, :, None] == corners[is_new][:, None, :]

@@ -80,12 +80,10 @@ def retriangulated(
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As the control says.
     """
-    pieces = Pieces(*(np.empty((ROWS, width), np.int64) for width in (3, 4, 4, 3)), _zeros(4))
-    wished, rows = np.empty(0, np.int64), None
+    pieces = Pieces(_table(3), _table(4), _table(4), _table(3), _zeros(4))
+    patch = _patch_of(around, points, segments, edge_points, shapes, vertex_count)
+    rows = _rows_to_cut(patch)
     for _ in range(_ROUNDS):
-        patch = _patch_of(around, points, segments, edge_points, shapes, vertex_count)
-        if rows is None:
-            rows = _rows_to_cut(patch)
         pieces = _cut(patch, rows, around, pieces, control)
         wished = _taken(pieces.wishes, pieces.sizes, WISHES)
         if len(wished) == 0:
@@ -99,6 +97,7 @@ def retriangulated(
         edge_points, _ = with_points(edge_points, edges, along)
         rows = np.flatnonzero(np.isin(around.edges, edges).any(axis=1))
         _supersede(pieces, rows)
+        patch = _patch_of(around, points, segments, edge_points, shapes, vertex_count)
     raise InternalError(
         f"face {around.faces[wished[0, 0]]} and its neighbours do not agree on their edges; "
         "please report this mesh and these curves"
@@ -107,6 +106,10 @@ def retriangulated(
 
 def _zeros(count: int) -> Longs:
     return np.zeros(count, np.int64)
+
+
+def _table(width: int) -> Longs:
+    return np.empty((ROWS, width), np.int64)
 
 
 def _taken(array: Longs, sizes: Longs, which: int) -> Longs:
@@ -146,15 +149,9 @@ def _cut(
     patch: Patch, rows: Longs, around: Surroundings, pieces: Pieces, control: Control
 ) -> Pieces:
     """Return the pieces with those of some faces."""
-    work = Work(
-        Triangulation(
-            np.empty((ROWS, 2), np.int64),
-            *(np.empty(ROWS, np.int64) for _ in range(5)),
-            _zeros(2),
-        ),
-        Segments(*(np.empty((ROWS, width), np.int64) for width in (3, 2)), _zeros(3)),
-        _zeros(2),
-    )
+    names, leaving, tails, twins, claims = (np.empty(ROWS, np.int64) for _ in range(5))
+    triangulation = Triangulation(_table(2), names, leaving, tails, twins, claims, _zeros(2))
+    work = Work(triangulation, Segments(_table(3), _table(2), _zeros(3)), _zeros(2))
     outcome = int(Outcome.RUNNING)
     while outcome == Outcome.RUNNING:
         control.checkpoint(work.at[ROW] / max(len(rows), 1))

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from geodesic_core.arrays import Ints, Longs
+from geodesic_core.arrays import Longs
 from geodesic_core.mesh.degeneracies import lowest_joined, of_three_vertices
 
 _NEXT = np.array([1, 2, 0])
@@ -50,10 +50,10 @@ def is_on_curve(faces: Longs, curve_edges: Longs) -> Any:
     return np.isin(keys_of(_ends_of(faces)), keys_of(curve_edges))
 
 
-def parts_of(faces: Ints, curve_edges: Longs) -> Longs:
+def parts_of(faces: Longs, curve_edges: Longs) -> Longs:
     """Return the part of each face (F,): faces that edges other than those of curves join."""
     rows = np.flatnonzero(of_three_vertices(faces))
-    surface = faces[rows].astype(np.int64)
+    surface = faces[rows]
     h, g = joined_half_edges(surface, is_on_curve(surface, curve_edges))
     pairs = np.stack([rows[h // 3], rows[g // 3]], axis=1)
     parts: Longs = np.unique(lowest_joined(len(faces), pairs), return_inverse=True)[1]
@@ -79,7 +79,7 @@ def separated(faces: Longs, count: int, curve_edges: Longs) -> Separated:
     new[at_curve] = numbers
     taken = faces.copy()
     taken[rows] = new.reshape(-1, 3)
-    keys, index, times = np.unique(
+    _, index, times = np.unique(
         keys_of(_ends_of(taken[rows])[is_open]), return_index=True, return_counts=True
     )
     shut = keys_of(_ends_of(near)[is_open])[index[times > 1]]

@@ -41,4 +41,5 @@ def lengths_of(sides: Floats, steps: Floats) -> Floats:
     apex = np.abs(steps).argmin(axis=1)
     each = np.arange(len(steps))
     share, side = np.abs(steps[each, (apex + 1) % 3]), sides[each, (apex + 1) % 3]
-    return np.where(steps[each, apex] == 0.0, share * side, inside)
+    lengths: Floats = np.where(steps[each, apex] == 0.0, share * side, inside)
+    return lengths

@@ -1,4 +1,4 @@
-"""Points of curves in whole numbers: at vertices, on edges and in faces, the same from all faces."""
+"""Points of curves in whole numbers: at vertices, on edges and in faces, alike from all faces."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -43,7 +43,7 @@ class CurvePoints(NamedTuple):
     """The N points of all curves, one after another; those of a closed one begin and end it."""
 
     rows: Longs
-    """(N,): of their faces among the surroundings"""
+    """(N,): of their faces among the surroundings; without meaning at vertices"""
     steps: Longs
     """(N, 3): weights in these faces, in steps"""
     kinds: Longs
@@ -73,8 +73,9 @@ def surroundings_of(mesh: TriangleMesh, lines: Sequence[Line]) -> Surroundings:
     InvalidMesh
         Curves meet an edge of no length.
     """
-    seeds = np.unique(np.concatenate([faces for line in lines for faces in (line[0], line.faces)]))
-    own = np.unique(mesh.faces[seeds])
+    crossed = np.unique(np.concatenate([line.faces for line in lines]))
+    own = [mesh.faces[line.location_faces][line.location_weights > 0.0] for line in lines]
+    own = np.unique(np.concatenate([mesh.faces[crossed].reshape(-1), *own]))
     _check_ends_apart(mesh, own)
     is_own = np.zeros(len(mesh.vertices), bool)
     is_own[own] = True
@@ -133,14 +134,17 @@ def in_steps(weights: Floats) -> Longs:
     return steps
 
 
-def points_of(around: Surroundings, lines: Sequence[Line]) -> tuple[CurvePoints, EdgePoints]:
+def points_of(
+    mesh: TriangleMesh, around: Surroundings, lines: Sequence[Line]
+) -> tuple[CurvePoints, EdgePoints]:
     """Return the points of lines, and those of them that split edges."""
-    rows = np.searchsorted(around.faces, np.concatenate([line.location_faces for line in lines]))
+    faces = np.concatenate([line.location_faces for line in lines])
+    rows = np.searchsorted(around.faces, faces)
     steps = in_steps(np.concatenate([line.location_weights for line in lines]))
     kinds = (steps > 0).sum(axis=1)
     elements = rows.copy()
     at_vertex, on_edge = kinds == AT_VERTEX, np.flatnonzero(kinds == ON_EDGE)
-    elements[at_vertex] = around.corners[rows[at_vertex], steps[at_vertex].argmax(axis=1)]
+    elements[at_vertex] = mesh.faces[faces[at_vertex], steps[at_vertex].argmax(axis=1)]
     tails = (steps[on_edge].argmin(axis=1) + 1) % 3
     edges, along = on_edges(around, rows[on_edge], tails, steps[on_edge])
     edge_points, elements[on_edge] = with_points(no_edge_points(), edges, along)

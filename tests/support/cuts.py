@@ -100,7 +100,9 @@ def random_curve(mesh: gc.TriangleMesh, random: np.random.Generator) -> gc.Curve
     return gc.Curve(points)
 
 
-def shifted(mesh: gc.TriangleMesh, curve: gc.Curve, shift: float, random: np.random.Generator) -> gc.Curve:
+def shifted(
+    mesh: gc.TriangleMesh, curve: gc.Curve, shift: float, random: np.random.Generator
+) -> gc.Curve:
     """The curve with each weight that is not 0 changed a little."""
     points = []
     for point in curve.points:
@@ -111,7 +113,9 @@ def shifted(mesh: gc.TriangleMesh, curve: gc.Curve, shift: float, random: np.ran
     return gc.Curve(points)
 
 
-def random_curves(mesh: gc.TriangleMesh, random: np.random.Generator) -> list[gc.Curve | gc.GeodesicPath]:
+def random_curves(
+    mesh: gc.TriangleMesh, random: np.random.Generator
+) -> list[gc.Curve | gc.GeodesicPath]:
     most = 28 if len(mesh.faces) == 2 else 8
     curves: list[gc.Curve | gc.GeodesicPath] = []
     for _ in range(int(random.integers(1, most))):
@@ -125,7 +129,9 @@ def random_curves(mesh: gc.TriangleMesh, random: np.random.Generator) -> list[gc
     return curves
 
 
-def polylines(curves: Sequence[gc.Curve | gc.GeodesicPath], mesh: gc.TriangleMesh) -> Iterator[np.ndarray]:
+def polylines(
+    curves: Sequence[gc.Curve | gc.GeodesicPath], mesh: gc.TriangleMesh
+) -> Iterator[np.ndarray]:
     for curve in curves:
         points = curve.locations if isinstance(curve, gc.GeodesicPath) else curve.points
         yield np.array([mesh.position(point) for point in points])
@@ -172,7 +178,7 @@ def check_edges(cut: gc.CutMesh) -> None:
     ]
     for (u, v), count in edges(cut.copy_of[cut.faces]).items():
         corners = tuple(sorted(support[u] | support[v]))
-        assert count == (old[corners] if corners in old else 2), (u, v)
+        assert count == old.get(corners, 2), (u, v)
 
 
 def check_positions(cut: gc.CutMesh) -> None:
@@ -232,7 +238,9 @@ def check_distances(cut: gc.CutMesh, source: int) -> None:
     after = gc.exact_distance(cut.mesh, source).distances[: len(before)]
     reached = np.isfinite(before)
     assert np.array_equal(reached, np.isfinite(after))
-    assert np.abs(after - before)[reached].max() <= 1e-10 * max(before[reached].max(), cut.old.extent)
+    assert np.abs(after - before)[reached].max() <= 1e-10 * max(
+        before[reached].max(), cut.old.extent
+    )
 
 
 def check_separated(apart: gc.CutMesh) -> None:

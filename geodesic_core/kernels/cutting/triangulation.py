@@ -1,9 +1,9 @@
 r"""The triangulation of one face: points are inserted, edges are flipped.
 
-Half-edge ``h`` of triangle ``h // 3`` leaves its *tail* and has the triangle on its left; its *twin*
-runs the other way in the triangle beyond, and is -1 on an edge of the face. Triangles never turn
-over: a point goes into the triangle that contains it, and an edge is flipped only where both new
-triangles run counter-clockwise, by exact signs.
+Half-edge ``h`` of triangle ``h // 3`` leaves its *tail* and has the triangle on its left; its
+*twin* runs the other way in the triangle beyond, and is -1 on an edge of the face. Triangles never
+turn over: a point goes into the triangle that contains it, and an edge is flipped only where both
+new triangles run counter-clockwise, by exact signs.
 """
 
 from typing import Any, NamedTuple
