@@ -768,9 +768,9 @@ def cut(
     >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
     >>> cut = gc.cut(mesh, gc.shortest_path(mesh, 1, 2))
     >>> cut.parts.tolist()
-    [0, 1, 0, 1]
-    >>> gc.exact_distance(cut.mesh, 1).distances.round(3).tolist()
-    [1.0, 0.0, 1.414, inf, 0.707, inf, inf]
+    [0, 1, 1, 0]
+    >>> gc.exact_distance(cut.mesh, 0).distances.round(3).tolist()
+    [0.0, inf, 1.0, inf, inf, 0.707, 1.0, inf]
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     surface = mesh.mesh if isinstance(mesh, Solver) else as_mesh(mesh)

@@ -165,7 +165,8 @@ def _middle_of(start: Floats, end: Floats) -> Floats:
     """Return weights half-way; on an edge of the old mesh in whole steps, as its points are."""
     middle = 0.5 * (start + end)
     largest, each = middle.argmax(axis=1), np.arange(len(middle))
-    whole = np.floor(middle * STEPS) / STEPS
+    whole: Floats = np.floor(middle * STEPS) / STEPS
     whole[each, largest] += 1.0 - whole.sum(axis=1)
-    is_inside = (middle > 0.0).all(axis=1)
-    return np.where(is_inside[:, None], middle, whole)
+    inside = np.flatnonzero(middle.min(axis=1) > 0.0)
+    whole[inside] = middle[inside]
+    return whole

@@ -29,7 +29,7 @@ class CutMesh:
     >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
     >>> cut = gc.cut(mesh, gc.shortest_path(mesh, 1, 2))
     >>> cut
-    CutMesh(7 vertices, 4 faces, 2 parts)
+    CutMesh(8 vertices, 4 faces, 2 parts)
     >>> cut.face_of.tolist()
     [0, 0, 1, 1]
     """
@@ -182,7 +182,7 @@ class CutMesh:
         >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
         >>> cut = gc.cut(mesh, gc.shortest_path(mesh, 1, 2))
         >>> [str(point) for point in cut.to_new(gc.SurfacePoint.face(0, (0.75, 0.125, 0.125)))]
-        ['the point (0.5, 0.25, 0.25) of face 1']
+        ['the point (0.25, 0.625, 0.125) of face 1']
         """
         given = [self.old.point(p, f"point {i}") for i, p in enumerate(each_of(points, "point"))]
         return [self._to_new(point) for point in given]
@@ -220,8 +220,8 @@ class CutMesh:
         Returns
         -------
         numpy.ndarray
-            (V', …) interpolated linearly in the old faces, old vertices with their own values; or
-            (F', …) with each face's old value.
+            (V', …) float64, interpolated linearly in the old faces, old vertices with their own
+            values; or (F', …), of the type of the values, with each face's old value.
 
         Raises
         ------

@@ -74,8 +74,8 @@ def surroundings_of(mesh: TriangleMesh, lines: Sequence[Line]) -> Surroundings:
         Curves meet an edge of no length.
     """
     crossed = np.unique(np.concatenate([line.faces for line in lines]))
-    own = [mesh.faces[line.location_faces][line.location_weights > 0.0] for line in lines]
-    own = np.unique(np.concatenate([mesh.faces[crossed].reshape(-1), *own]))
+    at_points = [mesh.faces[line.location_faces][line.location_weights > 0.0] for line in lines]
+    own = np.unique(np.concatenate([mesh.faces[crossed].reshape(-1), *at_points])).astype(np.int64)
     _check_ends_apart(mesh, own)
     is_own = np.zeros(len(mesh.vertices), bool)
     is_own[own] = True

@@ -51,10 +51,18 @@ def apart(places: Longs, i: int, j: int) -> int:
 
 
 @kernel
-def is_beside(places: Longs, i: int, j: int, k: int) -> bool:
-    """Whether k is between the ends of the segment from i to j, and NEAR it or on it."""
+def squared(places: Longs, i: int, j: int) -> float:
+    """Return the square of the distance of two points, the same either way."""
     dx, dy = float(places[j, 0] - places[i, 0]), float(places[j, 1] - places[i, 1])
-    if abs(twice_area(places, i, j, k)) > NEAR * max(abs(dx), abs(dy), abs(dx + dy)):
+    return dx * dx + dy * dy
+
+
+@kernel
+def is_beside(places: Longs, i: int, j: int, k: int) -> bool:
+    """Whether k is on the segment from i to j or NEAR it, and nearer to its ends than they are.
+
+    So pieces of segments that are led through points get shorter, and that comes to an end.
+    """
+    if abs(twice_area(places, i, j, k)) > NEAR * float(apart(places, i, j)):
         return False
-    along = dx * float(places[k, 0] - places[i, 0]) + dy * float(places[k, 1] - places[i, 1])
-    return 0.0 < along < dx * dx + dy * dy
+    return max(squared(places, i, k), squared(places, k, j)) < squared(places, i, j)
