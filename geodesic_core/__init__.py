@@ -16,6 +16,7 @@ Examples
 from geodesic_core import errors, samples
 from geodesic_core.compilation import compile_kernels, warm_up
 from geodesic_core.control import Control
+from geodesic_core.cutting.cut_mesh import CutMesh
 from geodesic_core.errors import GeodesicError
 from geodesic_core.fields.borders import Border
 from geodesic_core.fields.distance_field import DistanceField
@@ -42,6 +43,7 @@ from geodesic_core.search.nearest import Nearest
 from geodesic_core.solvers import (
     Solver,
     approximate_distance,
+    cut,
     distance_matrix,
     error_bound,
     exact_distance,
@@ -59,6 +61,7 @@ __all__ = [
     "Border",
     "Control",
     "Curve",
+    "CutMesh",
     "DistanceField",
     "ErrorBound",
     "GeodesicError",
@@ -84,6 +87,7 @@ __all__ = [
     "approximate_distance",
     "as_mesh",
     "compile_kernels",
+    "cut",
     "distance_matrix",
     "error_bound",
     "errors",

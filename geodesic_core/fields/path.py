@@ -241,7 +241,7 @@ def joined(legs: Sequence[GeodesicPath]) -> GeodesicPath:
         faces=np.concatenate([leg.faces for leg in legs]),
         closed=False,
         length=sum(leg.length for leg in legs),
-        _located=Locations(*map(chained, zip(*(leg._located for leg in legs), strict=True))),
+        located=Locations(*map(chained, zip(*(leg.located for leg in legs), strict=True))),
         error_bound=EXACT,
         steps=tuple(steps) or None,
     )

@@ -275,7 +275,7 @@ def _as_paths(
                 faces=faces[lo + 1 : hi],
                 closed=False,
                 length=float(lengths[i] - (0.0 if stop == AT_LENGTH else floats[i, LEFT])),
-                _located=rows_of(in_its_space, slice(lo, hi)),
+                located=rows_of(in_its_space, slice(lo, hi)),
                 error_bound=EXACT,
                 steps=None,
                 stopped=_word(mesh, stop, end),

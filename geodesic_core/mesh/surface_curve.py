@@ -60,7 +60,9 @@ class SurfaceCurve:
     """True where the last point is joined to the first, which is not repeated."""
     length: float
     """Length on the surface, mesh units."""
-    _located: Locations  # its points in space, not from the mesh's origin
+    located: Locations
+    """Its points as arrays: ``faces`` (K,), ``weights`` (K, 3) in them, ``vertices`` (K,), -1 for
+    none, and ``points`` (K, 3) in space, mesh units."""
 
     @property
     def points(self) -> Floats:
@@ -71,21 +73,21 @@ class SurfaceCurve:
         NotEmbedded
             The mesh is given by lengths alone: use `locations`.
         """
-        if np.isnan(self._located.points[:1, 0]).any():
+        if np.isnan(self.located.points[:1, 0]).any():
             raise NotEmbedded(
                 "the curve has no positions in space, as its mesh has lengths alone: use locations"
             )
-        return self._located.points
+        return self.located.points
 
     @cached_property
     def locations(self) -> tuple[SurfacePoint, ...]:
         """The K points on the surface, canonical."""
-        return tuple(point_of(self._located, i) for i in range(len(self._located.faces)))
+        return tuple(point_of(self.located, i) for i in range(len(self.located.faces)))
 
     @property
     def summary(self) -> str:
         """How many points it has, and its length, in words."""
-        count = len(self._located.faces)
+        count = len(self.located.faces)
         points = "1 point" if count == 1 else f"{count} points"
         return f"{points}, {'closed, ' if self.closed else ''}length {self.length:.6g}"
 
@@ -133,8 +135,8 @@ class SurfaceCurve:
 
     @property
     def _turned(self) -> Locations:
-        order = np.arange(len(self._located.faces))[::-1]
-        return rows_of(self._located, np.roll(order, 1) if self.closed else order)
+        order = np.arange(len(self.located.faces))[::-1]
+        return rows_of(self.located, np.roll(order, 1) if self.closed else order)
 
     def resample(
         self, spacing: float, start_near: Point | ArrayLike | None = None
@@ -221,7 +223,7 @@ class SurfaceCurve:
         >>> file.read_text().splitlines()
         ['v 0.0 0.0 0.0', 'v 1.0 1.0 0.0', 'l 1 2']
         """
-        located = self._located
+        located = self.located
         record = CurveRecord(
             self.points, located.faces, located.weights, self.faces, self.closed, self._properties
         )
@@ -306,7 +308,7 @@ class SurfaceCurve:
     @property
     def _shown(self) -> dict[str, Any]:
         """What a notebook shows."""
-        return {"points": len(self._located.faces), "closed": self.closed, "length": self.length}
+        return {"points": len(self.located.faces), "closed": self.closed, "length": self.length}
 
     @property
     def _properties(self) -> dict[str, Any]:
@@ -322,7 +324,7 @@ class SurfaceCurve:
 
     def _segments(self) -> tuple["TriangleMesh", Floats, Floats]:
         """Return the mesh, and the weights of both ends of each segment in its inner face."""
-        mesh, located = self.on_mesh(), self._located
+        mesh, located = self.on_mesh(), self.located
         start, end = segment_weights(mesh, located, self._inner_faces, self.closed)
         return mesh, start, end
 

@@ -52,8 +52,8 @@ RECORDS = {
 }
 RECORDS |= {"gc.MatrixFile", "gc.Nearest", "gc.Sample", "gc.SearchStep", "gc.SweepStats"}
 RECORDS |= {
-    "gc.SurfaceCurve",
     "gc.Border",
+    "gc.CutMesh",
     "gc.LogMap",
     "gc.Polar",
     "gc.StraightLine",

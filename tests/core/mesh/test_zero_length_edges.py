@@ -89,7 +89,7 @@ def check_on_the_surface(both, path, source, target, distance):
         faces=np.array([without[face] for face in path.faces.tolist()], np.int32),
         closed=False,
         length=path.length,
-        _located=Locations(
+        located=Locations(
             np.array([without.get(p.face_index, -1) for p in path.locations]),
             np.array([p.barycentric for p in path.locations]),
             np.array([-1 if p.vertex_index is None else p.vertex_index for p in path.locations]),

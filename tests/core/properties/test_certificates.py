@@ -45,7 +45,7 @@ def test_another_length_is_refused(path):
 def moved(path, k):
     """The path with a point that its location does not give."""
     points = changed(path.points, k, path.points[k] + 1e-12)
-    return replace(path, _located=path._located._replace(points=points))
+    return replace(path, located=path.located._replace(points=points))
 
 
 @pytest.mark.parametrize("k", [0, -1])
@@ -69,13 +69,13 @@ def test_another_point_is_refused(path):
     ],
 )
 def test_other_weights_are_refused(path, weights, claim):
-    other = changed(path._located.weights, EDGE, weights)
+    other = changed(path.located.weights, EDGE, weights)
     with pytest.raises(AssertionError, match=claim):
-        check(replace(path, _located=path._located._replace(weights=other)))
+        check(replace(path, located=path.located._replace(weights=other)))
 
 
 def test_the_higher_face_at_an_edge_is_refused(path):
-    mesh, located = path.mesh, path._located
+    mesh, located = path.mesh, path.located
     face, weights = located.faces[EDGE], located.weights[EDGE]
     edge = mesh.faces[face][weights > 0]
     (other,) = set(np.flatnonzero(np.isin(mesh.faces, edge).sum(axis=1) == 2)) - {face}
@@ -84,7 +84,7 @@ def test_the_higher_face_at_an_edge_is_refused(path):
         check(
             replace(
                 path,
-                _located=located._replace(
+                located=located._replace(
                     faces=changed(located.faces, EDGE, other),
                     weights=changed(located.weights, EDGE, there),
                 ),
