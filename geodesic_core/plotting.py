@@ -118,7 +118,6 @@ def _look(plotter: Any, camera: Camera | None) -> None:
             plotter.view_xz(negative=camera == "+y")
         case "+z" | "-z":
             plotter.view_xy(negative=camera == "-z")
-    plotter.camera.zoom(1.2)
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from geodesic_core.cutting.locations import Locations, weights_in
 from geodesic_core.cutting.separation import parts_of
 from geodesic_core.cutting.shapes import lengths_of, sides_of
 from geodesic_core.errors import InvalidArgument
-from geodesic_core.fields.sources import each_of
+from geodesic_core.fields.sources import as_given, each_of
 from geodesic_core.mesh.surface_point import Points, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.reprs import as_table
@@ -120,8 +120,8 @@ class CutMesh:
         """
         return parts_of(self.copy_of[self.faces], self.curve_edges)
 
-    def to_old(self, points: Points) -> list[SurfacePoint]:
-        """Return points of the cut mesh as points of the old one.
+    def to_old(self, points: Points) -> Any:
+        """Return a point of the cut mesh, or several, as points of the old one.
 
         Parameters
         ----------
@@ -130,7 +130,7 @@ class CutMesh:
 
         Returns
         -------
-        list of SurfacePoint
+        SurfacePoint or list of SurfacePoint
             Canonical.
 
         Raises
@@ -146,7 +146,7 @@ class CutMesh:
         ['vertex 3', 'the point (0.5, 0.0, 0.5) of face 0']
         """
         given = [self.mesh.point(p, f"point {i}") for i, p in enumerate(each_of(points, "point"))]
-        return [self._to_old(point) for point in given]
+        return as_given(points, [self._to_old(point) for point in given])
 
     def _to_old(self, point: SurfacePoint) -> SurfacePoint:
         if point.vertex_index is not None:
@@ -155,8 +155,8 @@ class CutMesh:
         u, v, w = (point.barycentric @ self._weights(self.faces[point.face_index], face)).tolist()
         return self.old.point(SurfacePoint.face(int(face[0]), (u, v, w)))
 
-    def to_new(self, points: Points) -> list[SurfacePoint]:
-        """Return points of the old mesh as points of the cut one.
+    def to_new(self, points: Points) -> Any:
+        """Return a point of the old mesh, or several, as points of the cut one.
 
         Parameters
         ----------
@@ -165,7 +165,7 @@ class CutMesh:
 
         Returns
         -------
-        list of SurfacePoint
+        SurfacePoint or list of SurfacePoint
             Canonical on `mesh`. Of a point on a curve that was opened, one of several.
 
         Raises
@@ -181,11 +181,11 @@ class CutMesh:
         --------
         >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
         >>> cut = gc.cut(mesh, gc.shortest_path(mesh, 1, 2))
-        >>> [str(point) for point in cut.to_new(gc.SurfacePoint.face(0, (0.75, 0.125, 0.125)))]
-        ['the point (0.25, 0.625, 0.125) of face 1']
+        >>> str(cut.to_new(gc.SurfacePoint.face(0, (0.75, 0.125, 0.125))))
+        'the point (0.25, 0.625, 0.125) of face 1'
         """
         given = [self.old.point(p, f"point {i}") for i, p in enumerate(each_of(points, "point"))]
-        return [self._to_new(point) for point in given]
+        return as_given(points, [self._to_new(point) for point in given])
 
     def _to_new(self, point: SurfacePoint) -> SurfacePoint:
         if point.vertex_index is not None:

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike
 from geodesic_core import plotting
 from geodesic_core.arrays import Floats
 from geodesic_core.errors import InvalidArgument
-from geodesic_core.fields.sources import each_of
+from geodesic_core.fields.sources import as_given, each_of
 from geodesic_core.kernels.curves.chains import link_crossing_chains
 from geodesic_core.kernels.curves.level_sets import chain_level_set
 from geodesic_core.mesh.surface_curve import SurfaceCurve, curves_of, draw_over
@@ -153,7 +154,7 @@ class ScalarField:
         gradient[~np.isfinite(gradient).all(axis=1)] = np.nan
         return gradient
 
-    def at(self, points: Points) -> float | Floats:
+    def at(self, points: Points) -> Any:
         """Return the value at a point, or the values at several.
 
         Parameters
@@ -178,9 +179,8 @@ class ScalarField:
         >>> field.at(3), field.at([1, gc.SurfacePoint.face(0, (0.5, 0.5, 0.0))]).tolist()
         (3.0, [1.0, 0.5])
         """
-        given = each_of(points, "point")
-        found = np.array([self._at(point, f"point {i}") for i, point in enumerate(given)])
-        return float(found[0]) if given is not points and len(found) == 1 else found
+        found = [self._at(point, f"point {i}") for i, point in enumerate(each_of(points, "point"))]
+        return as_given(points, np.array(found))
 
     def _at(self, given: Point, name: str) -> float:
         point = self.mesh.point(given, name)
@@ -228,6 +228,7 @@ class ScalarField:
         Examples
         --------
         >>> from pathlib import Path
+        from typing import Any
         >>> from tempfile import mkdtemp
         >>> file = Path(mkdtemp()) / "heights.png"
         >>> mesh = gc.samples.sphere(80)

@@ -307,6 +307,11 @@ def each_of(points: Points, name: str) -> Iterable[Point]:
     return points
 
 
+def as_given(points: Points, found: Any) -> Any:
+    """Return what was found of each of some points: by itself where one point was given."""
+    return found[0] if isinstance(unboxed(points), SurfacePoint | int | np.integer) else found
+
+
 def as_points(
     mesh: TriangleMesh, points: Points, name: str, control: Control
 ) -> Sequence[SurfacePoint]:

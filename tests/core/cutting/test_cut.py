@@ -207,12 +207,12 @@ def test_points_go_there_and_back():
     random = np.random.default_rng(1)
     for face in random.integers(len(mesh.faces), size=50).tolist():
         given = mesh.point(gc.SurfacePoint.face(face, tuple(random.dirichlet([1, 1, 1]).tolist())))
-        (new,) = cut.to_new(given)
-        (old,) = cut.to_old(new)
+        new = cut.to_new(given)
+        old = cut.to_old(new)
         assert np.abs(cut.mesh.position(new) - mesh.position(given)).max() <= 1e-14
         assert np.abs(mesh.position(old) - mesh.position(given)).max() <= 1e-14
     for vertex in range(len(cut.vertices)):
-        (old,) = cut.to_old(vertex)
+        old = cut.to_old(vertex)
         assert old == cut.location_of[vertex]
         assert np.abs(mesh.position(old) - cut.vertices[vertex]).max() <= 1e-15
     every = range(len(mesh.vertices))
