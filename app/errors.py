@@ -79,6 +79,12 @@ CODES: Mapping[str, Code] = {
         422, "Invalid mesh", "The mesh cannot be used; `errors` names the faulty elements."
     ),
     "invalid_point": Code(422, "Invalid point", "A source or target is not a point of the mesh."),
+    "not_embedded": Code(
+        422,
+        "Not embedded",
+        "The mesh is given by the lengths of its edges, and the query needs positions in space: "
+        "upload it with vertices, or ask for angles in place of vectors.",
+    ),
     "limit_exceeded": Code(
         422,
         "Limit exceeded",
@@ -342,6 +348,7 @@ EXCEPTIONS: Sequence[tuple[type[BaseException], Callable[[Any], Problem]]] = (
     (core.MissingExtra, lambda error: Problem("unsupported_media_type", str(error))),
     (core.InvalidMesh, _invalid_mesh),
     (core.InvalidPoint, lambda error: Problem("invalid_point", str(error))),
+    (core.NotEmbedded, lambda error: Problem("not_embedded", str(error))),
     (core.InvalidArgument, lambda error: Problem("invalid_request", str(error))),
     (core.DeadlineExceeded, lambda error: Problem("deadline_exceeded", str(error))),
     (core.MemoryLimitExceeded, _over_memory),

@@ -594,11 +594,16 @@ def log_map(
 
     Raises
     ------
+    NoTangentPlane
+        Several fans of faces meet at the source, or three faces or more at its edge.
     InvalidPoint
-        The source is not on the mesh, or has no tangent plane: several fans of faces meet there, or
-        three faces or more at its edge. Or no path leads to the point at which the x axis looks.
+        The source is not on the mesh, or no path leads to the point at which the x axis looks.
+    NoDirection
+        The x axis is zero, or along the normal.
+    NotEmbedded
+        The x axis is a vector, and the mesh is given by its lengths.
     InvalidArgument
-        The x axis has no direction, or another argument is out of its domain.
+        Another argument is out of its domain.
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As in `exact_distance`.
 
@@ -671,11 +676,16 @@ def trace(
 
     Raises
     ------
+    NoTangentPlane
+        A start has none, as in `log_map`.
     InvalidPoint
-        A start is not on the mesh, or has no tangent plane, as in `log_map`.
+        A start is not on the mesh.
+    NoDirection
+        A vector is zero, or along the normal.
+    NotEmbedded
+        A direction is a vector, and the mesh is given by its lengths.
     InvalidArgument
-        A vector has no direction on the surface, numbers of starts, directions and lengths differ,
-        or another argument is out of its domain.
+        Numbers of starts, directions and lengths differ, or another argument is out of its domain.
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As in `exact_distance`.
 

@@ -20,11 +20,13 @@ from app.queries.distances import DistancesQuery
 from app.queries.field_cache import FieldCache, Unwritten
 from app.queries.isolines import IsolinesQuery
 from app.queries.locate import LocateQuery
+from app.queries.log_map import LogMapQuery
 from app.queries.matrix import MatrixQuery
 from app.queries.nearest import NearestQuery
 from app.queries.path import PathQuery, naming_parameters, written_request
 from app.queries.paths import PathsQuery
 from app.queries.steps import StepsQuery
+from app.queries.trace import TraceQuery
 from app.queries.validation import MeshSize, check_lengths
 
 KINDS: Mapping[str, type[Query[Any]]] = {
@@ -38,6 +40,8 @@ KINDS: Mapping[str, type[Query[Any]]] = {
         BordersQuery,
         MatrixQuery,
         NearestQuery,
+        LogMapQuery,
+        TraceQuery,
         LocateQuery,
     )
 }
@@ -52,6 +56,7 @@ __all__ = [
     "FieldCache",
     "IsolinesQuery",
     "LocateQuery",
+    "LogMapQuery",
     "MatrixQuery",
     "MeshSize",
     "NearestQuery",
@@ -59,6 +64,7 @@ __all__ = [
     "PathsQuery",
     "Query",
     "StepsQuery",
+    "TraceQuery",
     "Unwritten",
     "check_lengths",
     "code_version",

@@ -48,6 +48,7 @@ class BordersQuery(FromSources[BordersRequest]):
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep, then draw the borders, if they fit into the answer."""
         request = self.request
+        opened.mesh.require_positions("a border")
         chord_error = resolved_chord_error(opened.mesh, request.chord_error)
         starts = to_sources(opened.mesh, request.sources, points)
         field = solve_field(

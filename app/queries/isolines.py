@@ -32,6 +32,7 @@ from app.queries.validation import (
     check_count,
     check_json_size,
     invalid_fields,
+    naming,
 )
 from app.queries.views import lines_of
 from app.schemas.requests import IsolinesRequest
@@ -73,6 +74,7 @@ class IsolinesQuery(FromSources[IsolinesRequest]):
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep, then draw level by level, as long as the lines fit into the answer."""
+        opened.mesh.require_positions("an isoline")
         chord_error = resolved_chord_error(opened.mesh, self.request.chord_error)
         starts = to_sources(opened.mesh, self.request.sources, points)
         field = solve_field(
@@ -113,10 +115,8 @@ class IsolinesQuery(FromSources[IsolinesRequest]):
         request = self.request
         if request.levels is not None:
             return request.levels
-        try:
+        with naming((gc.errors.InvalidArgument, "/count")):
             levels = gc.spaced_levels(distances, self._level_count)
-        except gc.errors.InvalidArgument as error:
-            raise invalid_fields(["/count"], str(error)) from None
         return [float(level) for level in levels]
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import geodesic_core as gc
 from app.encoding import CSV, JSON, OBJ
-from app.queries.validation import invalid_fields
+from app.queries.validation import naming
 
 OFFERS: Sequence[str] = JSON, OBJ, CSV
 """Media types that hold lines."""
@@ -15,10 +15,8 @@ VALUES_OF_LINE_POINT = 4
 
 def resolved_chord_error(mesh: gc.TriangleMesh, chord_error: float | None) -> float:
     """Return the chord error of a request, mesh units, or refuse it; by default the library's."""
-    try:
+    with naming((gc.errors.InvalidArgument, "/chord_error")):
         return gc.resolve_chord_error(mesh, chord_error)
-    except gc.errors.InvalidArgument as error:
-        raise invalid_fields(["/chord_error"], str(error)) from None
 
 
 def describe_line(line: gc.Isoline | gc.Border) -> dict[str, Any]:

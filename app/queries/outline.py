@@ -2,6 +2,9 @@
 
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 import geodesic_core as gc
 from app.queries.accuracy import CERTAIN, bound_of
 
@@ -11,17 +14,25 @@ SHOWN = "points", "locations", "faces"
 
 def outline_of(path: gc.GeodesicPath) -> dict[str, Any]:
     """Return the members of a path."""
+    return {"status": "ok", **polyline_of(path), "error_bound": bound_of(path.error_bound)}
+
+
+def polyline_of(path: gc.GeodesicPath) -> dict[str, Any]:
+    """Return the members of a path or a line as a polyline; its points only where it has any."""
     return {
-        "status": "ok",
         "length": path.length,
-        "points": path.points,
+        "points": points_of(path),
         "locations": [
             {"face": location.face_index, "barycentric": location.barycentric}
             for location in path.locations
         ],
         "faces": path.faces,
-        "error_bound": bound_of(path.error_bound),
     }
+
+
+def points_of(path: gc.GeodesicPath) -> NDArray[np.float64] | None:
+    """Return the points of a path or a line; None on a mesh without positions."""
+    return path.points if path.mesh is None or path.mesh.has_positions else None
 
 
 def no_outline(reason: str, field: gc.DistanceField | None = None) -> dict[str, Any]:

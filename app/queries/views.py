@@ -35,11 +35,18 @@ def line_of(outline: Mapping[str, Any], number: int | None = None) -> Line:
     """Return a path, or the reason why there is none; its ``number`` where there are several."""
     properties: dict[str, Any] = {} if number is None else {"path": number}
     properties |= {"status": outline.get("reason", "ok"), "length": outline["length"]}
-    locations = outline["locations"] or ()
+    return polyline(outline, properties, "" if number is None else f"path_{number}")
+
+
+def polyline(described: Mapping[str, Any], properties: Mapping[str, Any], group: str) -> Line:
+    """Return a described path or line, with the locations of its points."""
+    locations = described["locations"] or ()
     columns: dict[str, list[Any]] = {"face": [each["face"] for each in locations]}
     columns |= {x: [each["barycentric"][i] for each in locations] for i, x in enumerate("uvw")}
-    points = np.empty((0, 3)) if outline["points"] is None else outline["points"]
-    return Line(points, properties, "" if number is None else f"path_{number}", at_points=columns)
+    points = described["points"]
+    if points is None:
+        points = np.full((len(locations), 3), np.nan)
+    return Line(points, properties, group, at_points=columns)
 
 
 def lines_of(levels: Sequence[Mapping[str, Any]]) -> list[Line]:
@@ -112,7 +119,7 @@ def table_of_points(index: str, found: Sequence[Mapping[str, Any] | None]) -> Ta
             yield (
                 each.get(index, i),
                 each.get("distance"),
-                *each.get("position", _NOTHING),
+                *(each.get("position") or _NOTHING),
                 each.get("vertex"),
                 each.get("face"),
                 *each.get("barycentric", _NOTHING),

@@ -32,7 +32,9 @@ class ResolvedPoint(BaseModel):
     barycentric: tuple[float, float, float] | None = Field(
         default=None, description="The weights of that face's corners"
     )
-    position: tuple[float, float, float]
+    position: tuple[float, float, float] | None = Field(
+        description="Null on a mesh that is given by the lengths of its edges alone"
+    )
 
 
 class ResolvedCurve(BaseModel):
@@ -180,7 +182,10 @@ class Outline(BaseModel):
     status: Literal["ok", "no_path"]
     reason: Literal["disconnected", "beyond_max_distance"] | None = None
     length: float | None = Field(description="The length in mesh units; null without a path")
-    points: list[tuple[float, float, float]] | None
+    points: list[tuple[float, float, float]] | None = Field(
+        description="Null without a path, and on a mesh that is given by the lengths of its edges "
+        "alone"
+    )
     locations: list[Location] | None
     faces: list[int] | None = Field(description="The face of each segment of the path")
     error_bound: ErrorBound
@@ -282,9 +287,64 @@ class NearestAnswer(BaseModel):
     warnings: list[str]
 
 
+class LogMapAnswer(BaseModel):
+    """Where all vertices lie as seen from a source: how far, and in which direction."""
+
+    kind: Literal["log_map"]
+    mesh_id: str
+    source: ResolvedPoint
+    total_angle: float = Field(
+        description="Sum of the angles of the surface around the source, in radians"
+    )
+    distances: list[float | None] = Field(description="In mesh units; `null` where unreachable")
+    angles: list[float | None] = Field(
+        description="The angle on the surface at which the shortest path leaves the source: in "
+        "radians, counter-clockwise seen from outside, from 0 up to `total_angle`. At a boundary, "
+        "angles before the x axis are negative. `null` where unreachable and at the source"
+    )
+    coordinates: list[tuple[float | None, float | None]] = Field(
+        description="Each vertex in the tangent plane; twice `null` where unreachable"
+    )
+    bends: list[int | None] = Field(
+        description="Number of vertices that the path bends at. Behind the first bend all vertices "
+        "have its direction. `null` where unreachable"
+    )
+    unreachable: Unreachable
+    warnings: list[str]
+
+
+class StraightLine(BaseModel):
+    """A straightest line."""
+
+    stopped: Literal["length", "boundary", "barrier", "vertex", "non_manifold"] = Field(
+        description="What it ends at; `length` if it is as long as asked for"
+    )
+    length: float = Field(description="The length in mesh units")
+    end_direction: float | None = Field(
+        description="The direction in which it would go on: an angle at its last point, in "
+        "radians; null if directions have no meaning there"
+    )
+    points: list[tuple[float, float, float]] | None = Field(
+        description="Null on a mesh that is given by the lengths of its edges alone"
+    )
+    locations: list[Location]
+    faces: list[int] = Field(description="The face of each segment")
+
+
+class TraceAnswer(BaseModel):
+    """Straightest lines, in the order of the request."""
+
+    kind: Literal["trace"]
+    mesh_id: str
+    starts: list[ResolvedPoint]
+    lines: list[StraightLine]
+    warnings: list[str]
+
+
 class LocatedPoint(ResolvedPoint):
     """The point of the surface that is nearest to a position."""
 
+    position: tuple[float, float, float]
     distance: float = Field(description="Distance from the position in mesh units")
 
 

@@ -7,6 +7,7 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    StrictBool,
     StrictInt,
     model_validator,
 )
@@ -14,7 +15,9 @@ from pydantic_core import PydanticCustomError
 
 from app.schemas.points import (
     MOST_MEMBERS,
+    Axis,
     Count,
+    Directions,
     Ends,
     FailFastList,
     NonNegative,
@@ -280,6 +283,61 @@ class NearestRequest(AmongBarriers):
     k: Count = Field(default=1, description="Number of candidates to find, at most all of them")
     max_distance: NonNegative | None = Field(
         default=None, description="Candidates farther than this are left out"
+    )
+
+
+class LogMapRequest(AmongBarriers):
+    """How far all vertices are from ``source``, and in which direction; always exact."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {"source": {"vertex": 0}},
+                {"source": {"vertex": 0}, "x_axis": {"vertex": 7}, "max_distance": 2.0},
+            ]
+        }
+    )
+
+    source: Point
+    x_axis: Axis | None = Field(
+        default=None,
+        description="From where angles are measured: a point to look at, by its shortest path, or "
+        "a vector in space, which is projected to the surface. If not given: the edge that leaves "
+        "a vertex in its lowest face, from corner 0 to corner 1 of the lowest face for other "
+        "points, and where the surface begins at a boundary",
+    )
+    rescale: StrictBool = Field(
+        default=True,
+        description="Whether `coordinates` stretch or shrink the angles around the source to a "
+        "full turn",
+    )
+    max_distance: NonNegative | None = Field(
+        default=None, description="Vertices farther than this, in mesh units, count as unreachable"
+    )
+
+
+class TraceRequest(AmongBarriers):
+    """Straightest lines from ``starts``. Each list has one item for all lines, or one for each."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {"starts": [{"vertex": 0}], "directions": [0.0, 1.5], "lengths": [2.0]},
+                {"starts": [{"vertex": 0}], "directions": [[1.0, 0.0, 0.0]], "lengths": [2.0]},
+            ]
+        }
+    )
+
+    starts: FailFastList[Point] = Field(min_length=1)
+    directions: Directions = Field(
+        description="Angles, in radians, counter-clockwise from where those of a log map begin; or "
+        "vectors in space, which are projected to the surface"
+    )
+    lengths: FailFastList[NonNegative] = Field(min_length=1, description="Lengths in mesh units")
+    at_vertices: Literal["straight", "stop"] = Field(
+        default="straight",
+        description="`straight`: on through vertices, with equal angles on both sides; `stop`: to "
+        "the first vertex",
     )
 
 

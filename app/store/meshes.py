@@ -48,6 +48,7 @@ FileVersion = tuple[int, int]
 PUBLIC_ARRAYS = {
     "vertices": "vertices",
     "faces": "faces",
+    "lengths": "lengths",
     "vertex_map": "vertex_map",
     "face_map": "face_map",
     "components": "component",
@@ -251,6 +252,19 @@ class MeshStore:
         except OSError:  # the disk has no room for another name
             gone = self.folder / mesh_id
         shutil.rmtree(gone, ignore_errors=True)
+
+
+def public_arrays(manifest: Mapping[str, Any]) -> Mapping[str, str]:
+    """Return the arrays of a mesh that clients may read, and the names of their files.
+
+    A mesh that is given by lengths alone has no vertices.
+    """
+    absent = ["vertices"] if manifest["report"]["bounds"] is None else []
+    return {
+        name: stored
+        for name, stored in PUBLIC_ARRAYS.items()
+        if stored in manifest["crc32"] and name not in absent
+    }
 
 
 def encode_manifest(manifest: Mapping[str, Any]) -> bytes:

@@ -10,12 +10,14 @@ from geodesic_client.answers import (
     Job,
     ListedMesh,
     LocatedPoint,
+    LogMap,
     Matrix,
     Mesh,
     Neighbour,
     Path,
     Step,
     StoredMatrix,
+    StraightLine,
 )
 from geodesic_client.async_client import AsyncClient
 from geodesic_client.bars import progress_bar
@@ -36,6 +38,7 @@ __all__ = [
     "Job",
     "ListedMesh",
     "LocatedPoint",
+    "LogMap",
     "Matrix",
     "Mesh",
     "Neighbour",
@@ -43,6 +46,7 @@ __all__ = [
     "ProblemError",
     "Step",
     "StoredMatrix",
+    "StraightLine",
     "UnreachableError",
     "curve",
     "edge",

@@ -79,7 +79,7 @@ class Path:
     length: float
     """Infinite where there is no path"""
     points: Floats
-    """(K, 3), from source to target; (0, 3) where there is no path"""
+    """(K, 3), from source to target; (0, 3) where there is no path, or the mesh has no positions"""
     faces: Integers
     """The face of each piece, (K − 1,)"""
     locations: Sequence[Mapping[str, Any]]
@@ -192,6 +192,39 @@ class Neighbour:
     candidate: int
     """Index into the candidates"""
     distance: float
+
+
+@dataclass(frozen=True)
+class LogMap:
+    """Where each vertex lies as seen from a source: how far, and in which direction."""
+
+    distances: Floats
+    """(V,), infinite where unreachable"""
+    angles: Floats
+    """(V,), radians, at which the shortest path leaves the source; NaN where unreachable"""
+    coordinates: Floats
+    """(V, 2), in the tangent plane; NaN where unreachable"""
+    bends: Integers
+    """(V,), vertices that the path bends at; −1 where unreachable"""
+    total_angle: float
+    """Sum of the angles of the surface around the source, radians"""
+
+
+@dataclass(frozen=True)
+class StraightLine:
+    """A straightest line."""
+
+    length: float
+    points: Floats
+    """(K, 3), or (0, 3) on a mesh that is given by the lengths of its edges alone"""
+    faces: Integers
+    """The face of each piece, (K − 1,)"""
+    locations: Sequence[Mapping[str, Any]]
+    """Its K points, each as a face and the weights of its corners"""
+    stopped: str
+    """``length``, ``boundary``, ``barrier``, ``vertex`` or ``non_manifold``"""
+    end_direction: float
+    """Radians at the last point; NaN where directions have no meaning"""
 
 
 @dataclass(frozen=True)
@@ -347,6 +380,35 @@ def to_stored_matrix(job_id: str, response: httpx2.Response) -> StoredMatrix:
 def to_neighbours(response: httpx2.Response) -> list[Neighbour]:
     """Return the nearest candidates, nearest first."""
     return [Neighbour(each["candidate"], each["distance"]) for each in response.json()["nearest"]]
+
+
+def to_log_map(response: httpx2.Response) -> LogMap:
+    """Return a log map, from numpy's format."""
+    columns = to_array(response).astype(np.float64, copy=False)
+    return LogMap(
+        distances=columns[:, 0],
+        angles=columns[:, 1],
+        coordinates=columns[:, 2:4],
+        bends=columns[:, 4].astype(np.int64),
+        total_angle=float(_members_of_headers(response)["total_angle"]),
+    )
+
+
+def to_lines(response: httpx2.Response) -> list[StraightLine]:
+    """Return straightest lines, from JSON."""
+    return [_to_line(each) for each in response.json()["lines"]]
+
+
+def _to_line(line: Mapping[str, Any]) -> StraightLine:
+    direction = line["end_direction"]
+    return StraightLine(
+        length=line["length"],
+        points=np.array(line["points"] or [], np.float64).reshape(-1, 3),
+        faces=np.array(line["faces"], np.int64),
+        locations=line["locations"],
+        stopped=line["stopped"],
+        end_direction=np.nan if direction is None else direction,
+    )
 
 
 def to_located(response: httpx2.Response) -> list[LocatedPoint | None]:

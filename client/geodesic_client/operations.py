@@ -23,19 +23,23 @@ from geodesic_client.answers import (
     Job,
     ListedMesh,
     LocatedPoint,
+    LogMap,
     Matrix,
     Mesh,
     Neighbour,
     Path,
     Step,
     StoredMatrix,
+    StraightLine,
     to_array,
     to_borders,
     to_distances,
     to_isolines,
     to_job,
+    to_lines,
     to_listed_mesh,
     to_located,
+    to_log_map,
     to_matrix,
     to_mesh,
     to_neighbours,
@@ -68,9 +72,11 @@ Kind = Literal[
     "borders",
     "matrix",
     "nearest",
+    "log-map",
+    "trace",
     "locate",
 ]
-ArrayName = Literal["vertices", "faces", "vertex_map", "face_map", "components"]
+ArrayName = Literal["vertices", "faces", "lengths", "vertex_map", "face_map", "components"]
 
 _PART_BYTES = 2**23
 """Bytes of a stored matrix that are read at a time"""
@@ -428,6 +434,52 @@ def nearest(
     return (yield from _ask(mesh, "nearest", body, to_neighbours, progress))
 
 
+def log_map(
+    mesh: Mesh | str,
+    source: Point,
+    *,
+    x_axis: Point | Sequence[float] | None = None,
+    rescale: bool = True,
+    max_distance: float | None = None,
+    barriers: Sequence[int] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[LogMap]:
+    """Return how far each vertex is from a source, and in which direction.
+
+    Angles are measured from ``x_axis``: a point to look at, or a vector in space.
+    """
+    body = _body(
+        source=source, x_axis=x_axis, rescale=rescale, max_distance=max_distance, barriers=barriers
+    )
+    return (yield from _ask(mesh, "log-map", body, to_log_map, progress, NPY))
+
+
+def trace(
+    mesh: Mesh | str,
+    starts: Point | Sequence[Point],
+    directions: ArrayLike,
+    lengths: ArrayLike,
+    *,
+    at_vertices: Literal["straight", "stop"] = "straight",
+    barriers: Sequence[int] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[list[StraightLine]]:
+    """Return the straightest lines from some points in some directions, for some lengths.
+
+    Directions are angles (N,), in radians, or vectors in space (N, 3). Of starts, directions and
+    lengths there is one for all lines, or one for each.
+    """
+    given = np.asarray(directions, np.float64)
+    body = _body(
+        starts=as_points(starts),
+        directions=given if given.ndim == 2 else np.atleast_1d(given),
+        lengths=np.atleast_1d(np.asarray(lengths, np.float64)),
+        at_vertices=at_vertices,
+        barriers=barriers,
+    )
+    return (yield from _ask(mesh, "trace", body, to_lines, progress))
+
+
 def locate(
     mesh: Mesh | str,
     positions: Sequence[Sequence[float]] | ArrayLike,
@@ -552,6 +604,8 @@ class Operations:
     matrix_rows = Method(matrix_rows)
     save_matrix = Method(save_matrix)
     nearest = Method(nearest)
+    log_map = Method(log_map)
+    trace = Method(trace)
     locate = Method(locate)
     jobs = Method(jobs)
     job = Method(job)

@@ -10,7 +10,7 @@ import numpy as np
 
 from geodesic_core import plotting
 from geodesic_core.arrays import Floats, Ints, Longs
-from geodesic_core.errors import InternalError, InvalidArgument
+from geodesic_core.errors import InternalError, InvalidArgument, NotEmbedded
 from geodesic_core.fields.path_file import PathRecord, write_path_file
 from geodesic_core.fields.sources import Nodes
 from geodesic_core.kernels.outcome import Outcome
@@ -125,11 +125,11 @@ class GeodesicPath:
 
         Raises
         ------
-        InvalidArgument
+        NotEmbedded
             The mesh is given by lengths alone: use `locations`.
         """
         if np.isnan(self._points[0, 0]):
-            raise InvalidArgument(
+            raise NotEmbedded(
                 "the path has no positions in space, as its mesh has lengths alone: use locations"
             )
         return self._points

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from geodesic_core.arrays import Floats, Longs
 from geodesic_core.control import Control
-from geodesic_core.errors import InvalidArgument, InvalidPoint
+from geodesic_core.errors import InvalidArgument, InvalidPoint, NoDirection, NoTangentPlane
 from geodesic_core.fields.path import EXACT, GeodesicPath, point_of
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
@@ -102,11 +102,12 @@ def directions_from(
 
     Raises
     ------
-    InvalidPoint
-        A start has no tangent plane.
+    NoTangentPlane
+        A start has none.
+    NoDirection
+        A vector has none on the surface.
     InvalidArgument
-        They are neither finite angles nor finite vectors, one or as many as starts; or a vector has
-        no direction on the surface.
+        They are neither finite angles nor finite vectors, one or as many as starts.
     """
     try:
         given = np.asarray(directions, np.float64)
@@ -121,13 +122,18 @@ def directions_from(
     given = np.broadcast_to(given, (count, 3) if are_vectors else (count,))
     angles = np.empty(count)
     for i, start in enumerate(starts):
+        try:
+            frame = frame_at(mesh, start)
+        except NoTangentPlane as error:
+            raise NoTangentPlane(str(error), i) from None
         angle = direction_of(mesh, start, given[i]) if are_vectors else given[i]
         if math.isnan(angle):
-            raise InvalidArgument(
+            raise NoDirection(
                 f"direction {i} is {given[i].tolist()}, which is zero, or along the normal at "
-                f"{start}: it has no direction on the surface"
+                f"{start}: it has no direction on the surface",
+                i,
             )
-        angles[i] = frame_at(mesh, start).kernel_angles(np.array(angle))
+        angles[i] = frame.kernel_angles(np.array(angle))
     return angles
 
 

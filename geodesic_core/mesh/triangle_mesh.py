@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from geodesic_core import plotting
 from geodesic_core.arrays import Floats, Ints, Longs
-from geodesic_core.errors import InvalidArgument, InvalidMesh, InvalidPoint
+from geodesic_core.errors import InvalidArgument, InvalidMesh, InvalidPoint, NotEmbedded
 from geodesic_core.kernels.mesh import build
 from geodesic_core.kernels.mesh.half_edges import (
     LENGTH,
@@ -497,7 +497,7 @@ class TriangleMesh:
 
         Raises
         ------
-        InvalidArgument
+        NotEmbedded
             The mesh is given by lengths alone.
 
         Examples
@@ -505,9 +505,9 @@ class TriangleMesh:
         >>> gc.samples.plane(2).require_positions("a picture")
         """
         if not self.has_positions:
-            raise InvalidArgument(
-                f"{name} needs positions in space, and this mesh has lengths alone: make it by "
-                "TriangleMesh.from_lengths(faces, lengths, vertices)"
+            raise NotEmbedded(
+                f"{name} needs positions in space, and this mesh has lengths alone: give it "
+                "vertices as well"
             )
 
     def require_embedded(self, name: str) -> None:
@@ -520,7 +520,7 @@ class TriangleMesh:
 
         Raises
         ------
-        InvalidArgument
+        NotEmbedded
             The mesh is given by lengths.
 
         Examples
@@ -528,7 +528,7 @@ class TriangleMesh:
         >>> gc.samples.plane(2).require_embedded("a gradient")
         """
         if self.lengths is not None:
-            raise InvalidArgument(
+            raise NotEmbedded(
                 f"{name} is a vector in space, which a surface given by its lengths does not have: "
                 "use angles, as those of a log map"
             )

@@ -121,6 +121,7 @@ def test_lines_in_each_format(run: Run, knot: Path) -> None:
         "paths": ["--source", 3, "--target", 700, "--target", 20],
         "isolines": ["--source", 3, "--level", 2.5],
         "borders": ["--source", 3, "--source", 700],
+        "trace": ["--from", 3, "--direction", 0.5, "--direction", 2, "--length", 4],
     }
     for command, arguments in commands.items():
         for suffix in ("csv", "obj"):
@@ -659,6 +660,75 @@ def test_borders_are_drawn(run: Run, plane: Path) -> None:
     assert [tuple(line["sources"]) for line in drawn] == [line.sources for line in expected]
     assert [line["points"] for line in drawn] == [line.points.tolist() for line in expected]
     assert ran.out.count("border ") == len(expected) > 0
+
+
+def test_a_log_map_is_the_library_s(run: Run, plane: Path) -> None:
+    mesh = gc.load_mesh(plane)
+    for axis, looking in (("1,0.5,0", [1.0, 0.5, 0.0]), ("v60", 60)):
+        ran = run("log-map", plane, "--source", 3, "--x-axis", axis, "--out", "map.npy")
+        assert (ran.code, ran.err) == (0, "")
+        own = gc.log_map(mesh, 3, x_axis=looking)
+        columns = own.distances, own.angles, own.coordinates, own.bends
+        np.testing.assert_array_equal(np.load("map.npy"), np.column_stack(columns))
+    assert ran.figure("reached") == "121 of 121 vertices"
+    assert ran.figure("bent") == f"{(own.bends > 0).sum()} of 121 paths"
+    assert ran.figure("total angle") == repr(own.total_angle)
+    ran = run("log-map", plane, "--source", 60, "--true-angles", "--json")
+    own = gc.log_map(mesh, 60, rescale=False)
+    assert json.loads(ran.out)["coordinates"] == own.coordinates.tolist()
+
+
+def test_lines_go_straight_on(run: Run, plane: Path) -> None:
+    mesh = gc.load_mesh(plane)
+    start = ["--from", "v60"]
+    ran = run("trace", plane, *start, "--direction", "-1,0.5,0", "--length", 9, "--out", "t.json")
+    assert (ran.code, ran.err) == (0, "")
+    (line,) = json.loads(Path("t.json").read_text())["lines"]
+    own = gc.trace(mesh, 60, [-1.0, 0.5, 0.0], 9.0)
+    assert line["points"] == own.points.tolist()
+    assert f"{own.length!r} long" in ran.out
+    assert "stopped by boundary" in ran.out
+    many = [option for angle in (0, 1, 2) for option in ("--direction", angle)]
+    ran = run("trace", plane, *start, *many, "--length", 0.2, "--at-vertices", "stop", "--json")
+    found = json.loads(ran.out)["lines"]
+    expected = gc.trace(mesh, [60] * 3, [0.0, 1.0, 2.0], 0.2, at_vertices="stop")
+    assert [line["points"] for line in found] == [line.points.tolist() for line in expected]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("trace --from 60 --direction north --length 1", "'north' is neither an angle in radians"),
+        ("trace --from 60 --direction 1,0 --length 1", "'1,0' is neither an angle in radians"),
+        ("trace --from 60 --direction 0,0,1 --length 1", "--direction 0,0,1: direction 0 is [0.0"),
+        ("trace --from 999 --direction 1 --length 1", "--from 999: vertex 999 does not exist"),
+        ("trace --from 60 --direction 1 --length -1", "--length is -1.0"),
+        ("trace --from 60 --from 3 --direction 1 --length 1 --length 2 --length 3", "--from"),
+        ("log-map --source 60 --x-axis 0,0,1", "--x-axis: x_axis has no direction"),
+        ("log-map --source 60 --x-axis west", "west"),
+    ],
+)
+def test_directions_that_are_none(run: Run, plane: Path, arguments: str, message: str) -> None:
+    command, *rest = arguments.split()
+    ran = run(command, plane, *rest)
+    assert ran.code != 0
+    assert message in error_line(ran)
+
+
+def test_a_mesh_of_lengths_alone(run: Run) -> None:
+    np.savez("one.npz", faces=[[0, 1, 2]], lengths=[[3.0, 4.0, 5.0]])
+    assert run("info", "one.npz").figure("bounds") == "none"
+    assert run("distance", "one.npz", "--source", 0, "--out", "d.npy").code == 0
+    assert np.load("d.npy").tolist() == [0.0, 3.0, 5.0]
+    assert run("path", "one.npz", "--source", 0, "--target", 1).figure("length") == "3.0"
+    assert run("path", "one.npz", "--source", 0, "--target", 1, "--out", "p.csv").code == 0
+    for command, out in (
+        ("distance one.npz --source 0", "d.ply"),
+        ("locate one.npz --at 0,0,0", ""),
+    ):
+        ran = run(*command.split(), *(["--out", out] if out else []))
+        assert ran.code != 0
+        assert "lengths alone" in error_line(ran)
 
 
 def test_isolines_are_drawn(run: Run, plane: Path) -> None:

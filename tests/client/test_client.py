@@ -142,6 +142,23 @@ def test_isolines_matrices_and_candidates(
     assert [each.distance for each in near] == np.sort(table[0])[:2].tolist()
 
 
+def test_log_maps_and_lines_are_the_library_s(
+    service: Client, mesh: Mesh, same: gc.TriangleMesh
+) -> None:
+    found = service.log_map(mesh, 3, x_axis=9, max_distance=2.0)
+    expected_map = gc.log_map(same, 3, x_axis=9, max_distance=2.0)
+    for name in ("distances", "angles", "coordinates", "bends", "total_angle"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(expected_map, name))
+    for starts, directions in ((3, [0.1, 2.0]), ([3, 9], np.array([[1, 0, 0.5], [0, 1, 0]]))):
+        lines = service.trace(mesh, starts, directions, 1.5)
+        expected = gc.trace(same, np.resize(starts, 2).tolist(), directions, 1.5)
+        for line, own in zip(lines, expected, strict=True):
+            np.testing.assert_array_equal(line.points, own.points)
+            np.testing.assert_array_equal(line.faces, own.faces)
+            assert (line.length, line.stopped) == (own.length, own.stopped)
+            assert line.end_direction == own.end_direction
+
+
 def test_points_that_were_located_are_points(service: Client, mesh: Mesh) -> None:
     found, missed = service.locate(mesh, np.array([[3, 1, 0.5], [99, 0, 0]]), max_distance=9)
     assert missed is None

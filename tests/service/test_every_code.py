@@ -121,6 +121,13 @@ def too_large(site: Site) -> Any:
     return site.client.post(f"/v1/meshes/{mesh_id}/isolines", json=lines)
 
 
+def without_positions(site: Site) -> Any:
+    triangle = {"faces": [[0, 1, 2]], "lengths": [[1, 1, 1]]}
+    made = site.client.post("/v1/meshes", json=triangle)
+    assert made.status_code < 300, made.text
+    return site.ask(made.json()["id"], sources=[{"position": [0, 0, 0]}])
+
+
 def limited(site: Site) -> Any:
     with ThreadPoolExecutor() as threads, stopped(site.client.workers()):
         for _ in range(2):
@@ -254,6 +261,7 @@ PROVOKED: dict[str, Callable[[Site], Any]] = {
     "invalid_request": lambda site: site.ask(site.small, colour="red"),
     "invalid_mesh": lambda site: site.client.post("/v1/meshes", json=BROKEN),
     "invalid_point": lambda site: site.ask(site.small, sources=[{"vertex": -1}]),
+    "not_embedded": without_positions,
     "limit_exceeded": lambda site: site.ask(site.small, sources=MANY),
     "memory_limit": too_large,
     "rate_limited": limited,

@@ -21,6 +21,8 @@ OFFERED = {
     "borders": "json obj csv",
     "matrix": "json npy octets csv",
     "nearest": "json csv",
+    "log-map": "json npy octets csv ply",
+    "trace": "json npy octets obj csv",
     "locate": "json csv",
 }
 BODIES: dict[str, dict[str, Any]] = {
@@ -35,6 +37,8 @@ BODIES: dict[str, dict[str, Any]] = {
         "candidates": [{"vertex": 60}, {"face": 40, "barycentric": [0.2, 0.3, 0.5]}],
         "k": 2,
     },
+    "log-map": {"source": {"vertex": 0}, "max_distance": 5.0},
+    "trace": {"starts": [{"vertex": 0}], "directions": [0.5, 1.5], "lengths": [2.0, 0.0]},
     "locate": {"points": [[0.51, 0.32, 0.01], [0, 0, 7], [0, 0, 0]], "max_distance": 1.0},
 }
 MEDIA_TYPES = {

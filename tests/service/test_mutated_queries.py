@@ -60,6 +60,19 @@ MORE_SEEDS: Mapping[str, tuple[Any, ...]] = {
             "candidates": [{"vertex": 9}, {"face": 3, "barycentric": [1, 0, 0]}],
         },
     ),
+    "computeLogMap": (
+        {"source": 0, "x_axis": {"vertex": 9}, "rescale": False, "max_distance": 0.5},
+        {"source": {"edge": [0, 1], "t": 0.5}, "x_axis": [1, 0, 0], "barriers": [7]},
+    ),
+    "traceLines": (
+        {
+            "starts": [{"vertex": 7}, {"face": 3, "barycentric": [0.2, 0.3, 0.5]}],
+            "directions": [[1, 0, 0], [0, 1, 0]],
+            "lengths": [0.5],
+            "at_vertices": "stop",
+            "barriers": [7],
+        },
+    ),
     "locatePoints": ({"points": [[0.5, 0.5, 1]], "max_distance": 0.5},),
 }
 """What the examples of the interface document do not have"""

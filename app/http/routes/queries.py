@@ -134,6 +134,33 @@ OPERATIONS = (
         (CSV,),
     ),
     Operation(
+        "/log-map",
+        queries.LogMapQuery,
+        answers.LogMapAnswer,
+        "computeLogMap",
+        "How far all vertices are from a point, and in which direction: its exact log map",
+        "Return the distance of each vertex, the angle at which its shortest path leaves the "
+        "source, and its coordinates in\nthe tangent plane.\n\nShortest paths bend at saddles and "
+        "at the boundary. All that lies behind the first bend is seen in its\ndirection; `bends` "
+        "tells where.",
+        "The map. In binary, a row for each vertex: distance, angle, two coordinates, bends (-1 "
+        "where unreachable); as PLY, the mesh with these at its vertices",
+        (NPY, OCTETS, CSV, PLY),
+    ),
+    Operation(
+        "/trace",
+        queries.TraceQuery,
+        answers.TraceAnswer,
+        "traceLines",
+        "Straightest lines from points in directions",
+        "Return the lines that go straight on over faces and edges, and at equal angles through "
+        "vertices.\n\nThey end at their length, at the boundary, at barriers, and where more than "
+        "two faces meet.",
+        "The lines. In binary, a row for each point, with the numbers of CSV: line, length, "
+        "end_direction, point, x, y, z, face, u, v, w",
+        (NPY, OCTETS, *_LINES),
+    ),
+    Operation(
         "/locate",
         queries.LocateQuery,
         answers.LocateAnswer,

@@ -36,6 +36,8 @@ BODIES: dict[str, dict[str, Any]] = {
     "borders": LINES,
     "matrix": {"sources": POINTS, "targets": POINTS, "effort": 1, **ACCURACY, **LIMITS},
     "nearest": {"source": 1, "candidates": POINTS, "k": 2, **LIMITS},
+    "log_map": {"source": POINTS[3], "x_axis": [1, 0.5, 0], **LIMITS},
+    "trace": {"starts": POINTS, "directions": [[1, 0.5, 0]], "lengths": [2], "barriers": [5]},
     "locate": {"points": [[1, 2.5, 3]], "max_distance": 1},
 }
 """For each kind of query a body with all members that are numbers"""
@@ -78,5 +80,7 @@ def test_numbers_in_quotes_are_refused(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_integers_are_numbers_as_well(kind: str) -> None:
-    limit = read_body(kind, BODIES[kind]).max_distance
-    assert (limit, type(limit)) == (BODIES[kind]["max_distance"], float)
+    body = read_body(kind, BODIES[kind])
+    (given,) = BODIES[kind]["lengths"] if kind == "trace" else [BODIES[kind]["max_distance"]]
+    (limit,) = body.lengths if kind == "trace" else [body.max_distance]
+    assert (limit, type(limit)) == (given, float)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.errors import InvalidArgument, InvalidMesh
+from geodesic_core.errors import InvalidArgument, InvalidMesh, NotEmbedded
 from geodesic_core.kernels.mesh.half_edges import SIN_LEFT
 from geodesic_core.tolerances import ROUNDED_LENGTH
 from tests.core.fields.test_log_map import apart, sources_of
@@ -230,9 +230,10 @@ def test_what_needs_space_says_so():
         field.borders,
         lambda: gc.shortest_path(mesh, 0, 7).to_pyvista(),
     ):
-        with pytest.raises(InvalidArgument, match="lengths alone") as refusal:
+        with pytest.raises(NotEmbedded, match="lengths alone") as refusal:
             ask()
         assert "\n" not in str(refusal.value)
+    assert mesh.report.bounds is None
     for ask in (
         lambda: field.gradient,
         lambda: gc.trace(mesh, 0, [1.0, 0.0, 0.0], 1.0),
