@@ -49,7 +49,7 @@ def surface_of(vertices: Floats, faces: Ints, call: str) -> Any:
     return pyvista.PolyData.from_regular_faces(vertices.copy(), faces.copy())
 
 
-def line_of(points: Floats, closed: bool, call: str) -> Any:
+def line_of(points: Floats, call: str, *, closed: bool = False) -> Any:
     """Return a ``pyvista.PolyData`` of the line through some points, or of the only one.
 
     A closed line goes back to the first of them.

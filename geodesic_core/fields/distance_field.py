@@ -267,8 +267,12 @@ class DistanceField:
             lines = chain.from_iterable(self.isolines(levels) if len(levels) else [])
             shown = [line.to_pyvista() for line in lines]
             plotting.draw_lines(plotter, shown, plotting.ISOLINE, plotting.ISOLINE_WIDTH)
-            sources = chain.from_iterable(self._sweep.question.polylines)
-            draw_over(self.mesh, plotter, paths, [*sources, *points])
+            sources = self._sweep.question.polylines
+            places = [[self.mesh.position(point) for point in line] for line in sources]
+            curves = [plotting.line_of(np.array(each), "plot") for each in places if len(each) > 1]
+            plotting.draw_lines(plotter, curves, plotting.PATH, plotting.PATH_WIDTH)
+            alone = [line[0] for line in sources if len(line) == 1]
+            draw_over(self.mesh, plotter, paths, [*alone, *points])
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """Return `distances`, as numpy asks for them: ``numpy.asarray(field)``."""

@@ -81,7 +81,7 @@ def _dxf(record: CurveRecord) -> bytes:
 
 
 def _vtp(record: CurveRecord) -> bytes:
-    line = plotting.line_of(record.points, record.closed, "SurfaceCurve.save")
+    line = plotting.line_of(record.points, "SurfaceCurve.save", closed=record.closed)
     line.point_data["face"] = record.location_faces
     line.point_data["barycentric"] = record.location_weights
     line.field_data["length"] = [record.properties["length"]]

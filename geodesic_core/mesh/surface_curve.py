@@ -249,7 +249,7 @@ class SurfaceCurve:
         3
         """
         call = f"{type(self).__name__}.to_pyvista"
-        line = plotting.line_of(self.points, self.closed, call)
+        line = plotting.line_of(self.points, call, closed=self.closed)
         line.field_data["length"] = [self.length]
         return line
 
