@@ -40,7 +40,6 @@ CODES: Mapping[str, Code] = {
         400, "Malformed request", "The bytes received are not a valid HTTP request."
     ),
     "unauthorized": Code(401, "Unauthorized", "The request has no API key, or a wrong one."),
-    "forbidden": Code(403, "Forbidden", "The API key does not allow this request."),
     "origin_not_allowed": Code(
         403, "Origin not allowed", "Pages of other sites may not make changes here; see `hint`."
     ),

@@ -139,7 +139,7 @@ class Worker:
             _stop_if(cancel)
             with clock.phase("store"):
                 check = partial(_stop_if, cancel)
-                written = self.store.write_aside(mesh, work.folder, work.owner, work.name, check)
+                written = self.store.write_aside(mesh, work.folder, work.name, check)
         except FileNotFoundError:
             if cancel():  # then the upload and the scratch folder are removed
                 raise gc.errors.Cancelled from None

@@ -82,27 +82,25 @@ class JobManager:
             self.runner.start(job, query)
         return job
 
-    async def find(self, owner: str | None, job_id: str) -> Job:
-        """Return the present state of a job; raises ``ProblemError`` where the owner has none."""
-        job = await self._repository.find(owner, job_id)
+    async def find(self, job_id: str) -> Job:
+        """Return the present state of a job; raises ``ProblemError`` where there is none."""
+        job = await self._repository.find(job_id)
         if job is None:
             raise problem("job_not_found", f"there is no job {job_id!r}")
         return job
 
-    async def page(
-        self, owner: str | None, limit: int, before: int | None
-    ) -> tuple[list[Job], int | None]:
-        """Return ``limit`` jobs of an owner, the newest first, and the number to go on before."""
-        return await self._repository.page(owner, limit, before)
+    async def page(self, limit: int, before: int | None) -> tuple[list[Job], int | None]:
+        """Return ``limit`` jobs, the newest first, and the number to go on before, if any."""
+        return await self._repository.page(limit, before)
 
     async def count(self) -> Counter[str]:
-        """Return the number of jobs of all owners by status."""
+        """Return the number of jobs by status."""
         return Counter(await self._repository.count_by_status())
 
-    async def cancel(self, owner: str | None, job_id: str) -> Job:
+    async def cancel(self, job_id: str) -> Job:
         """Stop a job, and return its last state; one that has finished stays as it is."""
         while True:
-            job = await self.find(owner, job_id)
+            job = await self.find(job_id)
             if job.is_finished:
                 return job
             last = job.dismissed()
@@ -112,15 +110,15 @@ class JobManager:
                 self.runner.nudge()
                 return last
 
-    async def remove(self, owner: str | None, job_id: str) -> Job:
+    async def remove(self, job_id: str) -> Job:
         """Remove a job with its answer, and return its last state; one that runs is stopped."""
-        last = await self.cancel(owner, job_id)
+        last = await self.cancel(job_id)
         await self._repository.remove(job_id)
         self._retention.discard(job_id)
         self.runner.forget(job_id)
         return last
 
-    async def result(self, owner: str | None, job_id: str) -> tuple[Job, Result]:
+    async def result(self, job_id: str) -> tuple[Job, Result]:
         """Acquire the answer of a job.
 
         Raises
@@ -129,7 +127,7 @@ class JobManager:
             There is no such job, it has not finished, it was dismissed, or it failed: then its own
             problem is raised.
         """
-        job = await self.find(owner, job_id)
+        job = await self.find(job_id)
         if job.problem is not None:
             raise problem(**vars(job.problem))
         if job.status == "dismissed":
@@ -156,7 +154,7 @@ class JobManager:
             with suppress(TimeoutError):
                 async with asyncio.timeout(WATCH_S):
                     await changed.wait()
-            now = await self._repository.find(job.spec.owner, job.id)
+            now = await self._repository.find(job.id)
             if now is None:
                 return
             job = now

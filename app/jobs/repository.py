@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ColumnElement, Executable, Row, delete, func, insert, select, update
+from sqlalchemy import Executable, Row, delete, func, insert, select, update
 
 from app.jobs.job import EndedJob, Job
 from app.state import Database
@@ -25,9 +25,9 @@ class JobRepository:
 
         The key of a job that failed or was dismissed is free again.
         """
-        owner, key = job.spec.owner, job.spec.idempotency_key
-        has_key = jobs.c.owner == owner, jobs.c.idempotency_key == key, ~_KEY_IS_FREE
-        async with self._database.transaction(f"jobs of {owner}") as connection:
+        key = job.spec.idempotency_key
+        has_key = jobs.c.idempotency_key == key, ~_KEY_IS_FREE
+        async with self._database.transaction("new jobs") as connection:
             if key is not None:
                 known = await connection.scalar(select(jobs.c.record).where(*has_key))
                 if known is not None:
@@ -54,19 +54,14 @@ class JobRepository:
         async with self._database.transaction() as connection:
             await connection.execute(delete(jobs).where(jobs.c.id == job_id))
 
-    async def find(self, owner: str | None, job_id: str) -> Job | None:
-        """Return the job of an owner with this id; None where there is none."""
-        return await self._job(jobs.c.owner == owner, jobs.c.id == job_id)
+    async def find(self, job_id: str) -> Job | None:
+        """Return the job with this id; None where there is none."""
+        rows = await self._rows(select(jobs.c.record).where(jobs.c.id == job_id))
+        return Job.model_validate(rows[0].record) if rows else None
 
-    async def load(self, job_id: str) -> Job | None:
-        """Return a job, whoever owns it; None where there is none."""
-        return await self._job(jobs.c.id == job_id)
-
-    async def page(
-        self, owner: str | None, limit: int, before: int | None
-    ) -> tuple[list[Job], int | None]:
-        """Return an owner's jobs, the newest first, and the number to go on before, if any."""
-        statement = select(jobs.c.number, jobs.c.record).where(jobs.c.owner == owner)
+    async def page(self, limit: int, before: int | None) -> tuple[list[Job], int | None]:
+        """Return ``limit`` jobs, the newest first, and the number to go on before, if any."""
+        statement = select(jobs.c.number, jobs.c.record)
         if before is not None:
             statement = statement.where(jobs.c.number < before)
         rows = await self._rows(statement.order_by(jobs.c.number.desc()).limit(limit + 1))
@@ -74,7 +69,7 @@ class JobRepository:
         return found, rows[limit - 1].number if len(rows) > limit else None
 
     async def count_by_status(self) -> dict[str, int]:
-        """Return the number of jobs of all owners by status."""
+        """Return the number of jobs by status."""
         rows = await self._rows(
             select(jobs.c.status, func.count().label("number")).group_by(jobs.c.status)
         )
@@ -87,12 +82,13 @@ class JobRepository:
 
     async def ended(self) -> list[EndedJob]:
         """Return the jobs that have finished."""
+        client = jobs.c.record["errand", "client"].as_string()
         result = jobs.c.record["result"].as_string()
-        statement = select(jobs.c.id, jobs.c.owner, result, jobs.c.finished)
+        statement = select(jobs.c.id, client, result, jobs.c.finished)
         rows: Sequence[Any] = await self._rows(statement.where(~_IS_UNFINISHED))
         return [
-            EndedJob(job_id, owner, result, datetime.fromisoformat(finished))
-            for job_id, owner, result, finished in rows
+            EndedJob(job_id, client, result, datetime.fromisoformat(finished))
+            for job_id, client, result, finished in rows
         ]
 
     async def load_with_query(self, job_id: str) -> tuple[Job, bytes | None] | None:
@@ -101,10 +97,6 @@ class JobRepository:
         statement = select(jobs.c.record, queries.c.query).select_from(both)
         rows = await self._rows(statement.where(jobs.c.id == job_id))
         return (Job.model_validate(rows[0].record), rows[0].query) if rows else None
-
-    async def _job(self, *conditions: ColumnElement[bool]) -> Job | None:
-        rows = await self._rows(select(jobs.c.record).where(*conditions))
-        return Job.model_validate(rows[0].record) if rows else None
 
     async def _rows(self, statement: Executable) -> Sequence[Row[Any]]:
         async with self._database.transaction() as connection:

@@ -14,7 +14,7 @@ from app.store.results import ResultStore
 
 
 class _FinishedJob(NamedTuple):
-    owner: str | None
+    client: str
     result: str | None
     due: float
     """Time of its removal, in seconds of `monotonic`"""
@@ -48,15 +48,15 @@ class Retention:
             return
         age_s = max(0.0, (datetime.now(UTC) - job.finished).total_seconds())
         due = monotonic() + self._ttl_s - age_s
-        self._finished[job.id] = _FinishedJob(job.owner, job.result, due)
+        self._finished[job.id] = _FinishedJob(job.client, job.result, due)
         if job.result is not None:
-            self._results.pin(job.result, job.owner)
+            self._results.pin(job.result, job.client)
 
     def discard(self, job_id: str) -> None:
         """Forget a job that has been removed."""
         job = self._finished.pop(job_id, None)
         if job is not None and job.result is not None:
-            self._results.unpin(job.result, job.owner)
+            self._results.unpin(job.result, job.client)
 
     def due(self) -> list[str]:
         """Return the ids of the jobs that are to be removed by now."""

@@ -205,10 +205,10 @@ class JobRunner:
             await self._end(job, job.failed(problem))
             return
         try:
-            self._results.pin_within_quota(result.name, job.spec.owner)
+            self._results.pin_within_quota(result.name, job.spec.client)
             last = job.successful(result.name)
             self._retention.add(EndedJob.of(last))  # which pins it as well
-            self._results.unpin(result.name, job.spec.owner)
+            self._results.unpin(result.name, job.spec.client)
         except ProblemError as error:
             last = job.failed(error.problem)
         self._results.release(result)
@@ -230,7 +230,7 @@ class JobRunner:
             try:
                 is_ours = await self._repository.update(job, before.version)
                 if not is_ours:  # it may have been recorded, although the database could not say so
-                    is_ours = await self._repository.load(job.id) == job
+                    is_ours = await self._repository.find(job.id) == job
             except OSError:
                 logger.exception("state of a job not recorded, to be tried again", job_id=job.id)
                 await asyncio.sleep(_RETRY_S)

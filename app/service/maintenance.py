@@ -35,9 +35,8 @@ class MeshEntry:
 
     id: str
     faces: int | None
-    """None where its manifest is damaged, as for the next three"""
+    """None where its manifest is damaged, as for the next two"""
     created: str | None
-    owner: str | None
     name: str | None
     bytes: int
     last_used: datetime
@@ -128,7 +127,6 @@ def _mesh_entry(root: Path, mesh_id: str, size: int, modified: float) -> MeshEnt
         mesh_id,
         manifest.get("report", {}).get("faces"),
         manifest.get("created"),
-        manifest.get("owner"),
         manifest.get("name"),
         size,
         datetime.fromtimestamp(modified, UTC),

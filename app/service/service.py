@@ -15,7 +15,6 @@ from app.access import Caller
 from app.engine.interface import Engine
 from app.engine.supplied import SuppliedEngine
 from app.engine.work import MeshInput, StoreMesh, Task
-from app.errors import ProblemError, problem
 from app.jobs import JobManager, JobRepository, JobRunner, Retention
 from app.queries import MeshSize
 from app.repeating import repeat
@@ -70,7 +69,6 @@ class Service:
             self.store.meshes,
             settings.store_bytes,
             evicts=settings.store_evict == "lru",
-            quota=settings.quota_bytes,
             shared=MeshRecords(self.database) if self.database.is_shared else None,
         )
         self.mesh_index = MeshIndex(self.store.meshes)
@@ -215,7 +213,7 @@ class Service:
             self.scratch.folder(context.caller.name) as scratch,
             time_limit(self.settings, context.deadline_s),
         ):
-            work = StoreMesh(mesh_input, scratch.path / "mesh", context.caller.owner, name)
+            work = StoreMesh(mesh_input, scratch.path / "mesh", name)
             task = Task(work, context.caller.name)
             while True:
                 done = await self.engine.run(task, ignore_progress)
@@ -245,24 +243,12 @@ class Service:
         report = (await self.store.meshes.manifest(mesh_id))["report"]
         return MeshSize(report["vertices"], report["faces"], report["mean_edge_length"])
 
-    async def delete_mesh(self, mesh_id: str, caller: Caller) -> None:
+    async def delete_mesh(self, mesh_id: str) -> None:
         """Remove a mesh and its results; afterwards no service that shares the store has it."""
-        if not caller.may_delete(await self._owner(mesh_id)):
-            raise problem("forbidden", f"mesh {mesh_id} was stored with another API key")
         await self.mesh_catalog.delete(mesh_id)
         await self._forget(mesh_id)
         if self.database.is_shared:
             await asyncio.sleep(self.store.meshes.trusted_s)
-
-    async def _owner(self, mesh_id: str) -> str | None:
-        """Return the owner of a mesh; None where it has none, or its manifest is damaged."""
-        try:
-            owner: str | None = (await self.store.meshes.manifest(mesh_id))["owner"]
-        except ProblemError as error:
-            if error.problem.code != "mesh_damaged":
-                raise
-            return None
-        return owner
 
     async def _forget(self, mesh_id: str) -> None:
         """Remove results and fields of a mesh that is gone, or that was damaged.

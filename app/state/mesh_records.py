@@ -1,4 +1,4 @@
-"""The catalogue of meshes in a database: what each takes, whose it is, and when it was used."""
+"""The catalogue of meshes in a database: what each takes, and when it was used."""
 
 from collections.abc import AsyncIterator, Collection, Iterable
 from contextlib import asynccontextmanager
@@ -47,15 +47,13 @@ class _Table:
         self._connection = connection
 
     async def all(self) -> dict[str, MeshRecord]:
-        columns = meshes.c.id, meshes.c.size, meshes.c.owner, meshes.c.pinned > CLOCK
+        columns = meshes.c.id, meshes.c.size, meshes.c.pinned > CLOCK
         rows = await self._connection.execute(select(*columns).order_by(meshes.c.used, meshes.c.id))
         return {mesh_id: MeshRecord(*record) for mesh_id, *record in rows}
 
     async def add(self, mesh_id: str, record: MeshRecord) -> None:
-        row = {"id": mesh_id, "size": record.size, "owner": record.owner}
-        await self._connection.execute(
-            insert(meshes).values(row | {"used": CLOCK, "pinned": 0}).on_conflict_do_nothing()
-        )
+        row = {"id": mesh_id, "size": record.size, "used": CLOCK, "pinned": 0}
+        await self._connection.execute(insert(meshes).values(row).on_conflict_do_nothing())
 
     async def remove(self, mesh_id: str) -> None:
         await self._connection.execute(delete(meshes).where(meshes.c.id == mesh_id))

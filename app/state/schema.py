@@ -23,7 +23,7 @@ from sqlalchemy import (
     func,
 )
 
-HEAD = "0003"
+HEAD = "0004"
 """The last revision"""
 BEFORE_ALEMBIC = "0002"
 """The revision of files of SQLite that have no number of theirs"""
@@ -47,11 +47,9 @@ jobs = Table(
     ),
     Column("record", JSON, nullable=False),
     _computed("id", "record ->> 'id'", unique=True),
-    _computed("owner", "record -> 'errand' ->> 'owner'"),
     _computed("idempotency_key", "record -> 'errand' ->> 'idempotency_key'"),
     _computed("status", "record ->> 'status'"),
     _computed("finished", "record ->> 'finished'"),
-    Index("jobs_by_owner", "owner", "number"),
     Index("jobs_by_key", "idempotency_key"),
     Index("jobs_by_end", "finished"),
     sqlite_autoincrement=True,  # numbers of removed jobs do not come again
@@ -74,7 +72,6 @@ meshes = Table(
     metadata,
     Column("id", Text, primary_key=True),
     Column("size", BigInteger, nullable=False),
-    Column("owner", Text),
     Column("used", Double, nullable=False),
     Column("pinned", Double, nullable=False),
 )

@@ -37,7 +37,6 @@ class MeshRecord(NamedTuple):
 
     size: int
     """Bytes of its files"""
-    owner: str | None
     is_pinned: bool = False
     """Whether a service that shares the table needs it at the moment"""
 
@@ -165,10 +164,7 @@ class MeshHome:
                 sizes[mesh_id] += each.size
             elif removes and each.is_abandoned:
                 self._objects.remove(each.name)
-        return {
-            mesh_id: MeshRecord(sizes[mesh_id], manifest["owner"] if manifest else None)
-            for mesh_id, manifest in manifests.items()
-        }
+        return {mesh_id: MeshRecord(sizes[mesh_id]) for mesh_id in manifests}
 
     def _read_all(self, ids: Iterable[str]) -> Sequence[Mapping[str, Any] | None]:
         with ThreadPoolExecutor(_CALLS) as pool:

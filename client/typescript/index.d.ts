@@ -293,7 +293,7 @@ export interface paths {
          * Remove a mesh and its results
          * @description Remove a mesh; queries that run on it are still answered.
          *
-         *     Where keys are set, only the key that stored the mesh first may remove it.
+         *     Where keys are set, any key may remove it.
          */
         delete: operations["deleteMesh"];
         options?: never;
@@ -329,7 +329,7 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * List your jobs
+         * List the jobs
          * @description List jobs, the newest first, `limit` at a time.
          */
         get: operations["listJobs"];
@@ -4191,7 +4191,7 @@ export interface operations {
             503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
             504: components["responses"]["Problem"];
-            /** @description storage_full, quota_exceeded */
+            /** @description storage_full */
             507: components["responses"]["Problem"];
         };
     };
@@ -4281,7 +4281,7 @@ export interface operations {
             400: components["responses"]["Problem"];
             /** @description unauthorized */
             401: components["responses"]["Unauthorized"];
-            /** @description forbidden, origin_not_allowed */
+            /** @description origin_not_allowed */
             403: components["responses"]["Problem"];
             /** @description mesh_not_found */
             404: {

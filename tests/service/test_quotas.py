@@ -9,7 +9,7 @@ from typing import Any
 from starlette.testclient import TestClient
 
 from tests.support.processes import stopped
-from tests.support.service import ServiceClient, check_problem, serving, upload_sample
+from tests.support.service import ServiceClient, check_problem, serving
 from tests.support.waiting import LONG_S, wait_until
 
 ALICE, BOB = ({"Authorization": f"Bearer {name}-0123456789abc"} for name in ("alice", "bob"))
@@ -31,31 +31,6 @@ def upload(client: TestClient, caller: Any, faces: int) -> Any:
 
 def limits_of(client: TestClient, caller: Any) -> Any:
     return client.get("/v1", headers=caller).json()["limits"]
-
-
-def test_stored_meshes(tmp_path: Path) -> None:
-    quota = 120_000
-    with keyed(tmp_path, quota_bytes=quota) as client:
-        assert limits_of(client, ALICE)["quota_bytes"] == quota
-        own = upload(client, ALICE, 200)
-        assert own.status_code == 201
-        refused = upload(client, ALICE, 242)
-        problem = check_problem(refused, 507, "quota_exceeded")
-        assert problem["limit"] == quota < problem["actual"]
-        assert problem["setting"] == "quota_bytes"
-        assert problem["hint"]
-        assert "retry-after" not in refused.headers
-        assert upload(client, ALICE, 200).status_code == 200, "it is stored already"
-
-        of_bob = upload(client, BOB, 242)
-        assert of_bob.status_code == 201
-        assert upload(client, ALICE, 242).status_code == 200, "it is Bob's, and counts for him"
-        check_problem(upload(client, BOB, 288), 507, "quota_exceeded")
-
-    with keyed(tmp_path, quota_bytes=quota) as client:
-        check_problem(upload(client, ALICE, 288), 507, "quota_exceeded")
-        client.delete(own.headers["location"], headers=ALICE)
-        assert upload(client, ALICE, 288).status_code == 201
 
 
 def test_uploads_at_once(tmp_path: Path) -> None:
@@ -115,12 +90,3 @@ def test_answers_to_jobs_of_one_caller_leave_room_for_those_of_another(tmp_path:
         assert problem["limit"] == 50_000 < problem["actual"]
         assert client.app.state.service.answering.solves["distances"] == solved
         run(BOB, 4)
-
-
-def test_without_keys_all_that_is_stored_has_one_owner(tmp_path: Path) -> None:
-    with serving(tmp_path, quota_bytes=100_000) as client:
-        upload_sample(client, "plane", 200)
-        other = TestClient(client.app, client=("10.0.0.2", 1))
-        other.portal = client.portal
-
-        check_problem(upload(other, None, 242), 507, "quota_exceeded")

@@ -7,7 +7,6 @@ from app.jobs.repository import JobRepository
 from app.state import Database
 
 SPEC = JobSpec(
-    owner=None,
     kind="distances",
     mesh_id="0" * 32,
     media_type="application/json",
@@ -17,8 +16,8 @@ SPEC = JobSpec(
 )
 
 
-def new_job(owner: str | None = None, key: str | None = None) -> Job:
-    return Job(spec=SPEC.model_copy(update={"owner": owner, "idempotency_key": key}))
+def new_job(client: str = "", key: str | None = None) -> Job:
+    return Job(spec=SPEC.model_copy(update={"client": client, "idempotency_key": key}))
 
 
 class SlowSubmissions(JobRepository):

@@ -102,7 +102,7 @@ class Store:
 
 async def end_of(service: Service, job_id: str) -> Job:
     """Return the last state of a job."""
-    job = await service.jobs.find(None, job_id)
+    job = await service.jobs.find(job_id)
     states = [state async for state in service.jobs.watch(job, 0)]
     return states[-1]
 
@@ -116,7 +116,7 @@ async def live(store: Store) -> None:
             await end_of(service, job_id)
             store.tell(job_id, "successful")
         store.tell(job_id, "deleting")
-        await service.jobs.remove(None, job_id)
+        await service.jobs.remove(job_id)
         store.tell(job_id, "deleted")
 
         has_begun = asyncio.Event()
@@ -130,7 +130,7 @@ async def live(store: Store) -> None:
         store.tell(job_id, "accepted")
         await has_begun.wait()
         store.tell(job_id, "deleting")
-        await service.jobs.cancel(None, job_id)
+        await service.jobs.cancel(job_id)
         store.tell(job_id, "dismissed")
 
 
@@ -144,7 +144,7 @@ async def finish(store: Store) -> None:
 async def verify(store: Store) -> None:
     """Check that all jobs finish with right answers, that what was told holds, and all files."""
     async with store.service() as (service, _):
-        jobs, _more = await service.jobs.page(None, 100, None)
+        jobs, _more = await service.jobs.page(100, None)
         ends = {job.id: await end_of(service, job.id) for job in jobs}
         for job in ends.values():
             if job.status == "successful":
@@ -177,7 +177,7 @@ def check_told(told: str, job: Job | None) -> None:
 
 async def check_answer(service: Service, job: Job) -> None:
     """Check an answer to the bit."""
-    _, result = await service.jobs.result(None, job.id)
+    _, result = await service.jobs.result(job.id)
     body = service.results.body(result).read_bytes()
     service.results.release(result)
     match job.spec.media_type:

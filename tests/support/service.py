@@ -128,7 +128,7 @@ async def scratch_folder(store: MeshStore) -> AsyncIterator[Path]:
         yield folder.path
 
 
-def store_mesh(root: Path, mesh: gc.TriangleMesh, owner: str | None = None) -> str:
+def store_mesh(root: Path, mesh: gc.TriangleMesh) -> str:
     """Put a mesh into a store on which no service runs."""
     store = MeshStore(root)
     own = Store(root)
@@ -136,7 +136,7 @@ def store_mesh(root: Path, mesh: gc.TriangleMesh, owner: str | None = None) -> s
 
     async def add() -> str:
         async with scratch_folder(store) as folder:
-            written = store.write_aside(mesh, folder / "mesh", owner)
+            written = store.write_aside(mesh, folder / "mesh")
             await catalog.add(written)
             return written.mesh_id
 

@@ -11,7 +11,6 @@ from app.encoding import NPY
 from app.engine.work import MeshFromFile, MeshFromSample
 from app.errors import Fault, over_limit, problem
 from app.http.dependencies import (
-    CallerDep,
     ContextDep,
     ServiceDep,
     note_work,
@@ -109,7 +108,6 @@ _BODIES = {
             "invalid_mesh",
             "quota_exceeded",
             *WORK_PROBLEMS,
-            quota_exceeded=507,
         ),
     },
     openapi_extra=_BODIES,
@@ -195,14 +193,14 @@ async def get_mesh(
     operation_id="deleteMesh",
     summary="Remove a mesh and its results",
     status_code=204,
-    responses=problems("forbidden", "mesh_not_found", "store_unavailable"),
+    responses=problems("mesh_not_found", "store_unavailable"),
 )
-async def delete_mesh(mesh_id: str, service: ServiceDep, caller: CallerDep) -> None:
+async def delete_mesh(mesh_id: str, service: ServiceDep) -> None:
     """Remove a mesh; queries that run on it are still answered.
 
-    Where keys are set, only the key that stored the mesh first may remove it.
+    Where keys are set, any key may remove it.
     """
-    await service.delete_mesh(mesh_id, caller)
+    await service.delete_mesh(mesh_id)
 
 
 @router.get(

@@ -19,7 +19,7 @@ from tests.support.service import check_problem
 CONTRACT = {
     400: {"malformed_body", "malformed_request", "idempotency_key_unused"},
     401: {"unauthorized"},
-    403: {"forbidden", "origin_not_allowed"},
+    403: {"origin_not_allowed"},
     404: {"mesh_not_found", "job_not_found", "not_found"},
     405: {"method_not_allowed"},
     406: {"not_acceptable"},

@@ -89,9 +89,9 @@ async def test_what_is_told_is_recorded(database: Database, tmp_path: Path) -> N
         for share in (0.25, 0.5):
             state = await anext(states)
             assert (state.status, state.progress, state.runs) == ("running", share, 1)
-            assert await others.find(None, job.id) == state
+            assert await others.find(job.id) == state
             notes[0](0.5)
-        assert (await jobs.cancel(None, job.id)).status == "dismissed"
+        assert (await jobs.cancel(job.id)).status == "dismissed"
         assert (await anext(states)).status == "dismissed"
 
 
@@ -110,13 +110,13 @@ async def test_a_job_that_another_process_dismisses_stops(
     repository, others = JobRepository(database), JobRepository(database)
     async with running(repository, results_in(tmp_path), solve) as jobs:
         job = await jobs.submit(WITH_KEY, QUERY)
-        while (state := await jobs.find(None, job.id)).status != "running":
+        while (state := await jobs.find(job.id)).status != "running":
             await asyncio.sleep(0.01)
         assert (await jobs.submit(WITH_KEY, QUERY)).id == job.id
         assert await others.update(state.dismissed(), state.version)
         jobs.runner.nudge()
         await stopped.wait()
-        assert (await jobs.find(None, job.id)).status == "dismissed"
+        assert (await jobs.find(job.id)).status == "dismissed"
         assert (await jobs.submit(WITH_KEY, QUERY)).id != job.id, "its key is free"
 
 
@@ -205,7 +205,7 @@ async def test_the_answer_of_a_job_is_held_by_all_services(
         for name in ("m/one", "m/two"):
             await stores[1].index(name)
         assert not has_room(stores[1])
-        await jobs.remove(None, job.id)
+        await jobs.remove(job.id)
         await other.keep_up()
         assert has_room(stores[1])
 
@@ -222,7 +222,7 @@ async def test_a_job_that_is_removed_twice_leaves_the_answer_to_another_one(
         for _ in range(2):
             job = await last_of(jobs, await jobs.submit(SPEC, QUERY))
             assert job.status == "successful"
-        asked = [jobs.remove(None, job.id) for _ in range(2)]
+        asked = [jobs.remove(job.id) for _ in range(2)]
         await asyncio.gather(*asked, return_exceptions=True)
         results.release(results.add(answer(tmp_path, "m/two")))
         assert await results.find("m/one") is not None

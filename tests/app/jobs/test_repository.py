@@ -22,7 +22,7 @@ def repository(database: Database) -> JobRepository:
 
 
 async def test_jobs_are_counted_by_status(repository: JobRepository) -> None:
-    found = [await repository.add(new_job(owner), QUERY) for owner in ("alice", "bob", None)]
+    found = [await repository.add(new_job(), QUERY) for _ in range(3)]
     assert await repository.update(found[1].dismissed(), 1)
     assert await repository.count_by_status() == {"accepted": 2, "dismissed": 1}
     assert await repository.unfinished() == [found[0].id, found[2].id]
@@ -33,7 +33,7 @@ async def test_jobs_are_counted_by_status(repository: JobRepository) -> None:
 async def test_ends_are_found_whatever_else_a_record_says(
     database: Database, repository: JobRepository
 ) -> None:
-    found = [await repository.add(new_job(owner), QUERY) for owner in ("alice", None, None)]
+    found = [await repository.add(new_job(client), QUERY) for client in ("alice", "", "")]
     assert await repository.ended() == []
     last = found[0].running(0.0).successful("its answer")
     assert await repository.update(last, 1)
@@ -44,46 +44,34 @@ async def test_ends_are_found_whatever_else_a_record_says(
     ended = {job.id: job for job in await repository.ended()}
     assert ended.keys() == {job.id for job in found[:2]}
     assert ended[last.id] == (last.id, "alice", "its answer", last.finished)
-    assert ended[found[1].id][:3] == (found[1].id, None, None)
-
-
-async def test_jobs_are_found_by_owner_and_id(repository: JobRepository) -> None:
-    mine, nobodys = [await repository.add(new_job(owner), QUERY) for owner in ("alice", None)]
-    assert await repository.find("alice", mine.id) == await repository.load(mine.id) == mine
-    assert await repository.find(None, nobodys.id) == nobodys
-    assert await repository.find(None, mine.id) is None
-    assert await repository.find("bob", mine.id) is None
+    assert ended[found[1].id][:3] == (found[1].id, "", None)
 
 
 async def test_a_key_is_one_job_until_that_has_failed(repository: JobRepository) -> None:
-    async def submit(owner: str | None) -> Job:
-        return await repository.add(new_job(owner, "a key"), QUERY)
+    async def submit(client: str) -> Job:
+        return await repository.add(new_job(client, "a key"), QUERY)
 
-    mine, *others = await asyncio.gather(*(submit("alice") for _ in range(6)))
-    assert others == [mine] * 5
-    assert (await submit(None)).id != mine.id
-    assert await repository.update(mine.dismissed(), 1)
+    first, *others = await asyncio.gather(*(submit(f"client {number}") for number in range(6)))
+    assert others == [first] * 5, "all clients share their jobs"
+    assert await repository.update(first.dismissed(), 1)
     again = await submit("alice")
-    assert again.id != mine.id
+    assert again.id != first.id
     last = again.running(0.0).successful("a result")
     assert await repository.update(last, 1)
-    assert await submit("alice") == last
-    assert await repository.unfinished() != [], "the job of nobody"
+    assert await submit("bob") == last
+    assert await repository.unfinished() == []
 
 
 async def test_pages_begin_with_the_newest(repository: JobRepository) -> None:
-    added = []
-    for _ in range(5):
-        added.append(await repository.add(new_job("alice"), QUERY))
-        await repository.add(new_job("bob"), QUERY)
+    assert await repository.page(2, None) == ([], None)
+    added = [await repository.add(new_job(f"client {number}"), QUERY) for number in range(5)]
     seen, before = [], None
     while True:
-        page, before = await repository.page("alice", 2, before)
+        page, before = await repository.page(2, before)
         seen.append(page)
         if before is None:
             break
     assert seen == [added[4:2:-1], added[2:0:-1], added[:1]]
-    assert await repository.page("carol", 2, None) == ([], None)
 
 
 async def test_a_job_is_changed_by_whoever_knows_its_state_until_it_has_finished(
@@ -100,7 +88,7 @@ async def test_a_job_is_changed_by_whoever_knows_its_state_until_it_has_finished
     assert await repository.update(last, running.version)
     assert await repository.load_with_query(job.id) == (last, None)
     assert not await repository.update(last.dismissed(), last.version)
-    assert await repository.find("alice", job.id) == last
+    assert await repository.find(job.id) == last
     await repository.remove(job.id)
     assert not await repository.update(last, running.version)
 
@@ -110,4 +98,4 @@ async def test_of_those_who_change_a_job_one_does(repository: JobRepository) -> 
     states = [job.running(number / 10) for number in range(10)]
     changed = await asyncio.gather(*(repository.update(state, job.version) for state in states))
     assert changed.count(True) == 1
-    assert await repository.load(job.id) == states[changed.index(True)]
+    assert await repository.find(job.id) == states[changed.index(True)]

@@ -30,17 +30,17 @@ def calendar(monkeypatch: pytest.MonkeyPatch) -> Calendar:
     return calendar
 
 
-def finished_job(owner: str | None = None) -> Job:
-    return new_job(owner).running(0.0).successful("a result")
+def finished_job(client: str = "") -> Job:
+    return new_job(client).running(0.0).successful("a result")
 
 
 class Pins(Counter[str]):
     """Counts the pins of each result, as a store of results does."""
 
-    def pin(self, name: str, _owner: str | None) -> None:
+    def pin(self, name: str, _client: str) -> None:
         self[name] += 1
 
-    def unpin(self, name: str, _owner: str | None) -> None:
+    def unpin(self, name: str, _client: str) -> None:
         self[name] -= 1
 
 

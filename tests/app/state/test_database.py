@@ -74,9 +74,10 @@ async def test_revisions_lead_to_the_tables_of_the_schema(
 ) -> None:
     async with database.transaction() as connection:
         assert await connection.run_sync(differences) == []
-        for name in ("owner", "key"):
-            await connection.execute(text(f"DROP INDEX jobs_by_{name}"))
-            await connection.execute(text(f"CREATE INDEX jobs_of_{name} ON jobs (status)"))
+        await connection.execute(text("DROP INDEX jobs_by_key"))
+        await connection.execute(text("CREATE INDEX jobs_of_key ON jobs (status)"))
+        for table in ("jobs", "meshes"):
+            await connection.execute(text(f"ALTER TABLE {table} ADD COLUMN owner TEXT"))
         await connection.execute(text("UPDATE alembic_version SET version_num = '0002'"))
         assert await connection.run_sync(differences) != []
     Database(tmp_path / "jobs.sqlite3", state_url).prepare()

@@ -23,32 +23,27 @@ pytestmark = [
 class Replica:
     """A catalogue of its own, and meshes to add to it."""
 
-    def __init__(
-        self, root: Path, database: Database, capacity: int = 2**30, quota: int | None = None
-    ) -> None:
+    def __init__(self, root: Path, database: Database, capacity: int = 2**30) -> None:
         self.store = MeshStore(root)
         self.catalog = MeshCatalog(
             Store(root).meshes,
             capacity,
             evicts=True,
-            quota=quota,
             shared=MeshRecords(database),
         )
 
-    async def add(self, scale: int, owner: str | None = None) -> tuple[str, CatalogChange | None]:
+    async def add(self, scale: int) -> tuple[str, CatalogChange | None]:
         """Add a mesh; those of all scales take equally much."""
         sample = gc.samples.plane(50)
         vertices, faces = sample.vertices, sample.faces
         mesh = gc.TriangleMesh(vertices * scale, faces)
         async with scratch_folder(self.store) as folder:
-            written = self.store.write_aside(mesh, folder / "mesh", owner)
+            written = self.store.write_aside(mesh, folder / "mesh")
             return written.mesh_id, await self.catalog.add(written)
 
 
-async def started(
-    root: Path, database: Database, capacity: int = 2**30, quota: int | None = None
-) -> tuple[Replica, Replica]:
-    first, second = (Replica(root, database, capacity, quota) for _ in range(2))
+async def started(root: Path, database: Database, capacity: int = 2**30) -> tuple[Replica, Replica]:
+    first, second = (Replica(root, database, capacity) for _ in range(2))
     first.catalog.prepare()
     await first.catalog.reconcile()
     second.catalog.prepare()
@@ -69,18 +64,6 @@ async def test_two_catalogues_see_each_other(tmp_path: Path, database: Database)
         await first.catalog.delete(mesh_id)
     assert list(first.catalog.ids) == []
     assert await first.add(1) == (mesh_id, CatalogChange(is_new=True, evicted=[]))
-
-
-async def test_a_quota_is_shared(tmp_path: Path, database: Database) -> None:
-    first, _ = await started(tmp_path, database)
-    await first.add(1, "bob")
-    size = first.catalog.total
-    first, second = await started(tmp_path, database, quota=size * 3 // 2)
-    await first.add(2, "alice")
-    with pytest.raises(ProblemError) as refused:
-        await second.add(3, "alice")
-    assert refused.value.problem.code == "quota_exceeded"
-    await second.add(3, "carol")
 
 
 async def test_what_nobody_uses_is_evicted(tmp_path: Path, database: Database) -> None:
