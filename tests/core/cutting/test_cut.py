@@ -11,7 +11,15 @@ from geodesic_core.errors import InternalError, InvalidArgument, InvalidMesh, In
 from geodesic_core.kernels.cutting.predicates import STEPS, twice_area
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.tolerances import MERGE
-from tests.support.cuts import check_cut, check_tiling, fins, flat_grid
+from tests.support.cuts import (
+    KINDS,
+    check_cut,
+    check_tiling,
+    fins,
+    flat_grid,
+    random_curves,
+    random_mesh,
+)
 
 
 def mesh_of_torus(around: int = 12, across: int = 8) -> gc.TriangleMesh:
@@ -343,3 +351,11 @@ def test_a_defect_names_the_face(monkeypatch):
     monkeypatch.setattr(retriangulation, "cut_faces", lost)
     with pytest.raises(InternalError, match="face 0 cannot be cut"):
         gc.cut(gc.samples.plane(2), gc.Curve([0, 1]))
+
+
+@pytest.mark.jit
+@pytest.mark.parametrize("seed", [1300, 1960, 2246])
+def test_short_pieces_are_not_led_round_in_circles(seed):
+    random = np.random.default_rng(seed)
+    mesh = random_mesh(KINDS[seed % len(KINDS)], random)
+    check_cut(mesh, random_curves(mesh, random))
