@@ -129,7 +129,8 @@ def notes_on(
 def name_of(pointer: str) -> str:
     """Return how sentences call the point at a pointer, such as ``Source 2`` or ``The target``."""
     name, *numbers = (part for part in pointer.split("/") if part not in ("", "polyline"))
-    named = f"{name[:-1]} {numbers.pop(0)}" if name.endswith("s") else f"the {name}"
+    is_list = name.endswith("s") and bool(numbers)  # and not an axis
+    named = f"{name[:-1]} {numbers.pop(0)}" if is_list else f"the {name.replace('_', ' ')}"
     if not numbers:
         return named.capitalize()
     return f"Point {numbers[0]} of {named}"

@@ -180,7 +180,7 @@ class ScalarField:
         (3.0, [1.0, 0.5])
         """
         found = [self._at(point, f"point {i}") for i, point in enumerate(each_of(points, "point"))]
-        return as_given(points, np.array(found))
+        return as_given(points, found) if np.ndim(points) == 0 else np.array(found)
 
     def _at(self, given: Point, name: str) -> float:
         point = self.mesh.point(given, name)
@@ -228,7 +228,6 @@ class ScalarField:
         Examples
         --------
         >>> from pathlib import Path
-        from typing import Any
         >>> from tempfile import mkdtemp
         >>> file = Path(mkdtemp()) / "heights.png"
         >>> mesh = gc.samples.sphere(80)

@@ -58,7 +58,7 @@ class HeightField:
             return None
         foot, upwards = [*point[:2], self._below], [0.0, 0.0, 1.0]
         (hits,) = self._tree.intersect_ray(*self._arrays, np.array([foot]), np.array([upwards]))
-        heights = [self._below + hit[3] for hit in hits] or [0.0]
+        heights = [self._height_in(hit[0], foot) for hit in hits] or [0.0]
         if max(heights) - min(heights) > self._same_height:
             raise InvalidArgument(
                 f"the surface is not a height over the plane: at {place.tolist()} it has the "
@@ -66,3 +66,10 @@ class HeightField:
                 "space"
             )
         return face, point
+
+    def _height_in(self, hit: int, foot: list[float]) -> float:
+        """Return the height of a face of the tree above a place: the tree rounds its own to float32."""
+        vertices, faces = self._arrays
+        a, b, c = vertices[faces[hit]]
+        x, y, z = np.cross(b - a, c - a)
+        return float(a[2] - (x * (foot[0] - a[0]) + y * (foot[1] - a[1])) / z)
