@@ -144,6 +144,7 @@ PointOrLabelSources = Annotated[
         "repeated.",
     ),
 ]
+SomePointOrLabelSources = Annotated[list[PointOrLabel] | None, *get_args(PointOrLabelSources)[1:]]
 PointOrCurveSource = Annotated[
     PointOrCurve,
     typer.Option(

@@ -29,6 +29,7 @@ from app.cli.arguments import (
     PointOrCurveSources,
     PointOrLabelSources,
     RelativeError,
+    SomePointOrLabelSources,
     Source,
     Targets,
     accuracy,
@@ -41,6 +42,7 @@ from app.cli.output import AsJson, Output
 from app.cli.points import Direction, Point, Position
 from app.cli.steps import Failure, MeshInput
 from app.cli.summary import bound_in_words, print_bound, print_end, print_size
+from app.cli.values_file import Values
 
 if TYPE_CHECKING:
     from app.encoding import Answer
@@ -191,7 +193,15 @@ def _of_paths(given: Given, found: Mapping[str, Any]) -> Iterator[str]:
 def _levels(given: Given) -> dict[str, Any]:
     if (given["count"] is None) == (given["level"] is None):
         raise typer.BadParameter("give --count, or --level at least once, and not both")
-    return {"levels": given["level"], "count": given["count"]}
+    values = given["values"]
+    if (values is None) == (not given["source"]):
+        raise typer.BadParameter("give --source at least once, or --values, and not both")
+    levels = {"levels": given["level"], "count": given["count"]}
+    return levels if values is None else {**levels, "values": values.given}
+
+
+def _barriers(given: Given) -> dict[str, Any]:
+    return {"barriers": given["barriers"] or BlockedFaces()}
 
 
 def _of_isolines(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
@@ -210,6 +220,13 @@ def _of_borders(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
         first, second = line["sources"]
         kind = "closed" if line["closed"] else "open"
         yield f"border      of sources {first} and {second}: {kind}, {float(line['length'])!r} long"
+
+
+def _of_boundaries(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
+    for line in found["boundaries"]:
+        kind = "closed" if line["closed"] else "open"
+        count = len(line["vertices"])
+        yield f"boundary    {kind}, {count} vertices, {float(line['length'])!r} long"
 
 
 # Points
@@ -257,7 +274,7 @@ def _lines(given: Given) -> dict[str, Any]:
     return {
         "lengths": given["length"],
         "at_vertices": given["at_vertices"],
-        "barriers": given["barriers"] or BlockedFaces(),
+        **_barriers(given),
     }
 
 
@@ -339,15 +356,29 @@ COMMANDS = {
     ),
     "isolines": Command(
         "isolines",
-        "Draw lines of equal distance from the nearest source.",
+        "Draw lines of equal distance from the nearest source, or of equal values.",
         "Drawing isolines",
         {
-            "source": (PointOrLabelSources, _NEEDED),
+            "source": (SomePointOrLabelSources, None),
+            "values": (
+                Annotated[
+                    Values | None,
+                    typer.Option(
+                        parser=Values.read,
+                        metavar="FILE",
+                        help="In place of --source: a value for each vertex. A .npy file, or text "
+                        "with a number a line, or with a column named value.",
+                    ),
+                ],
+                None,
+            ),
             **_LINES_OUT,
             "level": (
                 Annotated[
                     list[float] | None,
-                    typer.Option(help="A distance at which to draw lines; may be repeated."),
+                    typer.Option(
+                        help="A distance, or a value, at which to draw lines; may be repeated."
+                    ),
                 ],
                 None,
             ),
@@ -376,6 +407,15 @@ COMMANDS = {
         {"source": (PointOrCurveSources, _NEEDED), **_LINES_OUT, **_CHORD_ERROR, **_REACH},
         {"sources": "source"},
         _of_borders,
+    ),
+    "boundaries": Command(
+        "boundaries",
+        "Find the boundary of the surface, as lines along its edges.",
+        "Following the boundary",
+        {**_LINES_OUT, "barriers": (Barriers, None)},
+        {},
+        _of_boundaries,
+        _barriers,
     ),
     "nearest": Command(
         "nearest",

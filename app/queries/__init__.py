@@ -16,6 +16,7 @@ from app.queries.base import (
     result_key,
 )
 from app.queries.borders import BordersQuery
+from app.queries.boundaries import BoundariesQuery
 from app.queries.distances import DistancesQuery
 from app.queries.field_cache import FieldCache, Unwritten
 from app.queries.isolines import IsolinesQuery
@@ -38,6 +39,7 @@ KINDS: Mapping[str, type[Query[Any]]] = {
         PathsQuery,
         IsolinesQuery,
         BordersQuery,
+        BoundariesQuery,
         MatrixQuery,
         NearestQuery,
         LogMapQuery,
@@ -51,6 +53,7 @@ __all__ = [
     "KINDS",
     "SMALL_SECONDS",
     "BordersQuery",
+    "BoundariesQuery",
     "DistancesQuery",
     "ExecutionContext",
     "FieldCache",

@@ -22,17 +22,22 @@ def polyline_of(path: gc.GeodesicPath) -> dict[str, Any]:
     return {
         "length": path.length,
         "points": points_of(path),
-        "locations": [
-            {"face": location.face_index, "barycentric": location.barycentric}
-            for location in path.locations
-        ],
+        "locations": locations_of(path),
         "faces": path.faces,
     }
 
 
-def points_of(path: gc.GeodesicPath) -> NDArray[np.float64] | None:
-    """Return the points of a path or a line; None on a mesh without positions."""
-    return path.points if path.mesh is None or path.mesh.has_positions else None
+def points_of(curve: gc.SurfaceCurve) -> NDArray[np.float64] | None:
+    """Return the points of a curve; None on a mesh without positions."""
+    return curve.points if curve.mesh is None or curve.mesh.has_positions else None
+
+
+def locations_of(curve: gc.SurfaceCurve) -> list[dict[str, Any]]:
+    """Return the members of the points of a curve on the surface."""
+    return [
+        {"face": location.face_index, "barycentric": location.barycentric}
+        for location in curve.locations
+    ]
 
 
 def no_outline(reason: str, field: gc.DistanceField | None = None) -> dict[str, Any]:

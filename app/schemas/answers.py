@@ -85,30 +85,51 @@ class DistancesAnswer(BaseModel):
     warnings: list[str]
 
 
-class IsolineDocument(BaseModel):
-    """A polyline of points at one distance."""
+class Location(BaseModel):
+    """A point of the surface in a face."""
+
+    face: int
+    barycentric: tuple[float, float, float]
+
+
+class LineDocument(BaseModel):
+    """A polyline on the surface."""
 
     closed: bool = Field(
         description="Whether the line leads from its last point back to the first, which is not "
         "repeated"
     )
-    length: float
-    points: list[tuple[float, float, float]]
+    length: float = Field(description="The length in mesh units")
+    points: list[tuple[float, float, float]] | None = Field(
+        description="Null on a mesh that is given by the lengths of its edges alone"
+    )
     faces: list[int] = Field(description="The face of each segment")
+    locations: list[Location] | None = Field(
+        default=None,
+        description="The points again, on the surface: if included, and on a mesh without "
+        "positions",
+    )
+
+
+class IsolineDocument(LineDocument):
+    """A polyline of points at one distance, or of one value."""
 
 
 class IsolineLevel(BaseModel):
-    """The lines at one distance."""
+    """The lines at one distance, or of one value."""
 
-    level: float = Field(description="The distance in mesh units")
+    level: float = Field(description="The distance in mesh units, or the value")
     lines: list[IsolineDocument] = Field(
         description="Closed lines, and open lines that end at the boundary or at an edge of three "
-        "faces or more; empty if no point is at that distance"
+        "faces or more, or where values are missing; empty if no point is at that level"
     )
 
 
 class IsolinesAnswer(BaseModel):
-    """The lines of each level, in the order of the levels."""
+    """The lines of each level, in the order of the levels.
+
+    Of values they are exact, with an error bound and a chord error of 0, without sources.
+    """
 
     kind: Literal["isolines"]
     mesh_id: str
@@ -123,20 +144,13 @@ class IsolinesAnswer(BaseModel):
     warnings: list[str]
 
 
-class BorderDocument(BaseModel):
+class BorderDocument(LineDocument):
     """A polyline of points that are equally near to two sources, and no nearer to a third."""
 
     sources: tuple[int, int] = Field(
         description="The two sources whose territories the line separates: indices into `sources`, "
         "the lower first"
     )
-    closed: bool = Field(
-        description="Whether the line leads from its last point back to the first, which is not "
-        "repeated"
-    )
-    length: float
-    points: list[tuple[float, float, float]]
-    faces: list[int] = Field(description="The face of each segment")
 
 
 class BordersAnswer(BaseModel):
@@ -156,11 +170,21 @@ class BordersAnswer(BaseModel):
     warnings: list[str]
 
 
-class Location(BaseModel):
-    """A point of the surface in a face."""
+class BoundaryDocument(LineDocument):
+    """A polyline of boundary edges, with the surface on its left."""
 
-    face: int
-    barycentric: tuple[float, float, float]
+    vertices: list[int] = Field(description="The vertex at each point")
+
+
+class BoundariesAnswer(BaseModel):
+    """The boundary of the surface, longest curve first; empty for a surface without boundary."""
+
+    kind: Literal["boundaries"]
+    mesh_id: str
+    boundaries: list[BoundaryDocument] = Field(
+        description="Closed lines, and open lines that end at an edge of three faces or more"
+    )
+    warnings: list[str]
 
 
 class SearchStep(BaseModel):

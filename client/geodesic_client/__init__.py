@@ -2,6 +2,7 @@
 
 from geodesic_client.answers import (
     Border,
+    Boundary,
     Distances,
     ErrorBound,
     Isoline,
@@ -28,6 +29,7 @@ from geodesic_client.points import curve, edge, face, position, starting_at
 __all__ = [
     "AsyncClient",
     "Border",
+    "Boundary",
     "Client",
     "Distances",
     "ErrorBound",

@@ -106,17 +106,21 @@ class Step:
 
 @dataclass(frozen=True)
 class Isoline:
-    """A line of points at one distance."""
+    """A line of points at one distance, or of one value."""
 
     points: Floats
+    """(K, 3), or (0, 3) on a mesh without positions, as for all lines"""
     faces: Integers
     closed: bool
     length: float
+    locations: Sequence[Mapping[str, Any]] = ()
+    """Its points, each as a face and the weights of its corners: where they were asked for, and on
+    a mesh without positions"""
 
 
 @dataclass(frozen=True)
 class IsolineLevel:
-    """The lines at one distance."""
+    """The lines at one distance, or of one value."""
 
     level: float
     lines: Sequence[Isoline]
@@ -124,7 +128,7 @@ class IsolineLevel:
 
 @dataclass(frozen=True)
 class Isolines:
-    """Lines of equal distance."""
+    """Lines of equal distance, or of equal values, which are exact."""
 
     levels: Sequence[IsolineLevel]
     chord_error: float
@@ -141,6 +145,24 @@ class Border:
     faces: Integers
     closed: bool
     length: float
+    locations: Sequence[Mapping[str, Any]] = ()
+    """Its points, each as a face and the weights of its corners: where they were asked for, and on
+    a mesh without positions"""
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """A line along edges that have one face, with the surface on its left."""
+
+    vertices: Integers
+    """(K,)"""
+    points: Floats
+    faces: Integers
+    closed: bool
+    length: float
+    locations: Sequence[Mapping[str, Any]] = ()
+    """Its points, each as a face and the weights of its corners: where they were asked for, and on
+    a mesh without positions"""
 
 
 @dataclass(frozen=True)
@@ -331,7 +353,7 @@ def to_isolines(response: httpx2.Response) -> Isolines:
     """Return isolines."""
     document = response.json()
     levels = [
-        IsolineLevel(each["level"], [_to_isoline(line) for line in each["lines"]])
+        IsolineLevel(each["level"], [Isoline(**_members_of(line)) for line in each["lines"]])
         for each in document["isolines"]
     ]
     return Isolines(levels, document["chord_error"], ErrorBound(**document["error_bound"]))
@@ -340,14 +362,16 @@ def to_isolines(response: httpx2.Response) -> Isolines:
 def to_borders(response: httpx2.Response) -> list[Border]:
     """Return borders."""
     return [
-        Border(
-            (line["sources"][0], line["sources"][1]),
-            np.array(line["points"], np.float64).reshape(-1, 3),
-            np.array(line["faces"], np.int64),
-            line["closed"],
-            line["length"],
-        )
+        Border((line["sources"][0], line["sources"][1]), **_members_of(line))
         for line in response.json()["borders"]
+    ]
+
+
+def to_boundaries(response: httpx2.Response) -> list[Boundary]:
+    """Return boundaries."""
+    return [
+        Boundary(np.array(line["vertices"], np.int64), **_members_of(line))
+        for line in response.json()["boundaries"]
     ]
 
 
@@ -416,9 +440,14 @@ def to_located(response: httpx2.Response) -> list[LocatedPoint | None]:
     return [None if each is None else _to_located(each) for each in response.json()["points"]]
 
 
-def _to_isoline(line: Mapping[str, Any]) -> Isoline:
-    points = np.array(line["points"], np.float64).reshape(-1, 3)
-    return Isoline(points, np.array(line["faces"], np.int64), line["closed"], line["length"])
+def _members_of(line: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "points": np.array(line["points"] or [], np.float64).reshape(-1, 3),
+        "faces": np.array(line["faces"], np.int64),
+        "closed": line["closed"],
+        "length": line["length"],
+        "locations": line.get("locations") or (),
+    }
 
 
 def _to_located(each: Mapping[str, Any]) -> LocatedPoint:

@@ -18,6 +18,7 @@ from geodesic_client.answers import (
     NPY,
     NPZ,
     Border,
+    Boundary,
     Distances,
     Isolines,
     Job,
@@ -33,6 +34,7 @@ from geodesic_client.answers import (
     StraightLine,
     to_array,
     to_borders,
+    to_boundaries,
     to_distances,
     to_isolines,
     to_job,
@@ -70,6 +72,7 @@ Kind = Literal[
     "paths",
     "isolines",
     "borders",
+    "boundaries",
     "matrix",
     "nearest",
     "log-map",
@@ -264,8 +267,9 @@ def paths(
 
 def isolines(
     mesh: Mesh | str,
-    sources: Point | Sequence[Point],
+    sources: Point | Sequence[Point] | None = None,
     *,
+    values: ArrayLike | None = None,
     levels: Sequence[float] | None = None,
     count: int | None = None,
     method: Literal["exact", "approximate"] = "exact",
@@ -274,14 +278,17 @@ def isolines(
     max_distance: float | None = None,
     chord_error: float | None = None,
     barriers: Sequence[int] = (),
+    include: Sequence[Literal["locations"]] = (),
     progress: Progress = ignore_progress,
 ) -> Flow[Isolines]:
     """Return the lines at some distances (``levels``), or at ``count`` evenly spaced ones.
 
-    ``sources`` is a point, or several.
+    ``sources`` is a point, or several. In their place, ``values`` (V,) are your own: lines are at
+    levels of these, and end where a value is NaN or infinite.
     """
     body = _body(
-        sources=as_points(sources),
+        sources=None if sources is None else as_points(sources),
+        values=None if values is None else _with_none(values),
         levels=levels,
         count=count,
         method=method,
@@ -290,6 +297,7 @@ def isolines(
         max_distance=max_distance,
         chord_error=chord_error,
         barriers=barriers,
+        include=include,
     )
     return (yield from _ask(mesh, "isolines", body, to_isolines, progress))
 
@@ -301,13 +309,30 @@ def borders(
     max_distance: float | None = None,
     chord_error: float | None = None,
     barriers: Sequence[int] = (),
+    include: Sequence[Literal["locations"]] = (),
     progress: Progress = ignore_progress,
 ) -> Flow[list[Border]]:
     """Return the lines between the parts of the surface that are nearest to each source."""
     body = _body(
-        sources=sources, max_distance=max_distance, chord_error=chord_error, barriers=barriers
+        sources=sources,
+        max_distance=max_distance,
+        chord_error=chord_error,
+        barriers=barriers,
+        include=include,
     )
     return (yield from _ask(mesh, "borders", body, to_borders, progress))
+
+
+def boundaries(
+    mesh: Mesh | str,
+    *,
+    barriers: Sequence[int] = (),
+    include: Sequence[Literal["locations"]] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[list[Boundary]]:
+    """Return the boundary of the surface, longest line first; none for a closed surface."""
+    body = _body(barriers=barriers, include=include)
+    return (yield from _ask(mesh, "boundaries", body, to_boundaries, progress))
 
 
 def matrix(
@@ -551,6 +576,12 @@ def _body(**members: Any) -> dict[str, Any]:
     return {name: value for name, value in members.items() if value is not None}
 
 
+def _with_none(values: ArrayLike) -> list[float | None]:
+    """Return numbers as JSON has them: None where they are not finite."""
+    numbers = np.asarray(values, np.float64)
+    return [each if np.isfinite(each) else None for each in numbers.tolist()]
+
+
 def _as_json(value: Any) -> Any:
     """Return what numpy's numbers and arrays, and ranges, are in JSON."""
     if isinstance(value, np.generic | np.ndarray):
@@ -599,6 +630,7 @@ class Operations:
     paths = Method(paths)
     isolines = Method(isolines)
     borders = Method(borders)
+    boundaries = Method(boundaries)
     matrix = Method(matrix)
     store_matrix = Method(store_matrix)
     matrix_rows = Method(matrix_rows)

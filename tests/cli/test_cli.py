@@ -121,6 +121,7 @@ def test_lines_in_each_format(run: Run, knot: Path) -> None:
         "paths": ["--source", 3, "--target", 700, "--target", 20],
         "isolines": ["--source", 3, "--level", 2.5],
         "borders": ["--source", 3, "--source", 700],
+        "boundaries": ["--barriers", "3,40"],
         "trace": ["--from", 3, "--direction", 0.5, "--direction", 2, "--length", 4],
     }
     for command, arguments in commands.items():
@@ -630,6 +631,7 @@ def test_what_fails_says_why_in_one_line(
         ("isolines plane.ply --source 0 --out l.obj", "give --count, or --level"),
         ("isolines plane.ply --source 0 --out l.obj --count 2 --level 1", "not both"),
         ("isolines plane.ply --source 0 --out l.obj --count 0", "--count"),
+        ("isolines plane.ply --out l.obj --count 1", "give --source at least once, or --values"),
         ("isolines plane.ply --source 0 --out l.npy --count 1", ".csv or .json"),
         ("path plane.ply --source 0 --target 1 --out p.obj --barriers 3;4", "'3;4' is not a list"),
         ("nearest plane.ply --source 0 --candidate 1 --barriers -3", "--barriers"),
@@ -760,6 +762,60 @@ def test_isolines_are_drawn(run: Run, plane: Path) -> None:
         *("--method", "approximate", "--chord-error", 0.01),
     )
     assert rough.figure("error bound") == "0.001 (relative, guaranteed)"
+
+
+def test_isolines_of_values_and_boundaries(run: Run, plane: Path) -> None:
+    mesh = gc.load_mesh(plane)
+    values = mesh.vertices[:, 0] - mesh.vertices[:, 1] ** 2
+    values[60:63] = np.nan
+    expected = gc.ScalarField(mesh, values).isolines([-0.25, 0.0])
+    np.save("v.npy", values)
+    cells = ["" if np.isnan(value) else repr(float(value)) for value in values]
+    Path("v.csv").write_text("vertex,value\n" + "".join(f"{i},{x}\n" for i, x in enumerate(cells)))
+    Path("v.txt").write_text("# heights\n" + "".join(f"{x or 'nan'}\n" for x in cells))
+    for name in ("v.npy", "v.csv", "v.txt"):
+        levels = "--level", -0.25, "--level", 0
+        ran = run("isolines", plane, "--values", name, *levels, "--out", "lines.json")
+        assert (ran.code, ran.err) == (0, "")
+        drawn = json.loads(Path("lines.json").read_text())["isolines"]
+        assert [[line["points"] for line in level["lines"]] for level in drawn] == [
+            [line.points.tolist() for line in lines] for lines in expected
+        ]
+    assert ran.figure("level       0.0").startswith(f": 0 closed, {len(expected[1])} open")
+    ran = run("boundaries", plane, "--barriers", "110", "--out", "rims.json")
+    own = mesh.with_barriers([110]).boundaries()
+    rims = json.loads(Path("rims.json").read_text())["boundaries"]
+    assert [rim["points"] for rim in rims] == [rim.points.tolist() for rim in own]
+    assert ran.out.count("boundary    closed, ") == len(own) == 2
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"1\n2 3\n", "line 2: '2 3' must be one number"),
+        (b"height\n1\n", "'height' has no column named value"),
+        (b"1\nup\n", "line 2: 'up' must be one number"),
+        (b"1\n2\n", "--values: the values have shape (2,)"),
+        (None, "cannot read v.txt"),
+    ],
+)
+def test_files_that_hold_no_values(
+    run: Run, plane: Path, content: bytes | None, words: str
+) -> None:
+    if content is not None:
+        Path("v.txt").write_bytes(content)
+    ran = run("isolines", plane, "--values", "v.txt", "--count", 2)
+    assert ran.code != 0
+    assert words in error_line(ran)
+
+
+def test_arrays_that_hold_no_values(run: Run, plane: Path) -> None:
+    np.save("v.npy", np.zeros((121, 2)))
+    for words in ("has the shape (121, 2)", "is no array of numpy's"):
+        ran = run("isolines", plane, "--values", "v.npy", "--count", 2)
+        assert ran.code != 0
+        assert words in error_line(ran)
+        Path("v.npy").write_bytes(b"no array")
 
 
 def test_barriers_are_in_the_way(run: Run, plane: Path) -> None:

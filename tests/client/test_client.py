@@ -123,6 +123,23 @@ def test_isolines_matrices_and_candidates(
     assert [each.level for each in lines.levels] == [0.5, 1.0]
     assert lines.levels[0].lines[0].points.shape[1] == 3
 
+    values = same.vertices[:, 0].copy()
+    values[5] = np.nan
+    lines = service.isolines(mesh, values=values, levels=[0.0], include=["locations"])
+    (own,) = gc.ScalarField(same, values).isolines([0.0])
+    assert (lines.chord_error, lines.error_bound.value, len(own) > 0) == (0.0, 0.0, True)
+    for line, expected_line in zip(lines.levels[0].lines, own, strict=True):
+        np.testing.assert_array_equal(line.points, expected_line.points)
+        assert [at["face"] for at in line.locations] == [
+            at.face_index for at in expected_line.locations
+        ]
+
+    (rim,) = service.boundaries(mesh, barriers=[3])
+    (expected_rim,) = same.with_barriers([3]).boundaries()
+    np.testing.assert_array_equal(rim.points, expected_rim.points)
+    assert rim.vertices.tolist() == [at.vertex_index for at in expected_rim.locations]
+    assert (rim.closed, rim.locations) == (True, ())
+
     borders = service.borders(mesh, [0, 7, 9])
     expected = gc.exact_distance(same, [0, 7, 9]).borders()
     assert [line.sources for line in borders] == [line.sources for line in expected]

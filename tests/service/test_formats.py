@@ -19,6 +19,7 @@ OFFERED = {
     "paths": "json obj csv",
     "isolines": "json obj csv",
     "borders": "json obj csv",
+    "boundaries": "json obj csv",
     "matrix": "json npy octets csv",
     "nearest": "json csv",
     "log-map": "json npy octets csv ply",
@@ -31,6 +32,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "paths": {"source": {"vertex": 0}, "targets": [{"vertex": 60}, {"vertex": 0}, {"vertex": 99}]},
     "isolines": {"sources": [{"vertex": 60}], "levels": [0.25, 0.5, 9.0]},
     "borders": {"sources": [{"vertex": 0}, {"vertex": 7}]},
+    "boundaries": {"barriers": [3]},
     "matrix": {"sources": [{"vertex": 0}, {"vertex": 7}], "targets": [{"vertex": 60}] * 3},
     "nearest": {
         "source": {"vertex": 0},

@@ -91,9 +91,40 @@ def test_what_lies_on_the_surface_is_the_library_s(client: TestClient, flat: str
     assert line["faces"] == expected_line.faces.tolist()
 
 
+def test_lines_are_locations(client: TestClient, flat: str) -> None:
+    mesh = gc.TriangleMesh.from_lengths(*torus())
+    field = gc.exact_distance(mesh, [0, 20])
+    heights = np.arange(float(CELLS**2))
+    drawn = ask(client, flat, "isolines", sources=[0, 20], levels=[0.1]).json()["isolines"]
+    own = ask(client, flat, "isolines", values=heights.tolist(), levels=[3.5]).json()["isolines"]
+    borders = ask(client, flat, "borders", sources=[0, 20]).json()["borders"]
+    rims = ask(client, flat, "boundaries", barriers=[0, 30]).json()["boundaries"]
+    expected: list[tuple[Any, list[gc.SurfaceCurve]]] = [
+        (drawn[0]["lines"], field.isolines([0.1])[0]),
+        (own[0]["lines"], gc.ScalarField(mesh, heights).isolines([3.5])[0]),
+        (borders, list(field.borders())),
+        (rims, mesh.with_barriers([0, 30]).boundaries()),
+    ]
+    for found, curves in expected:
+        assert len(found) == len(curves) > 0
+        for line, curve in zip(found, curves, strict=True):
+            assert (line["points"], line["closed"]) == (None, curve.closed)
+            assert (line["length"], line["faces"]) == (curve.length, curve.faces.tolist())
+            assert [(at["face"], tuple(at["barycentric"])) for at in line["locations"]] == [
+                (at.face_index, at.barycentric) for at in curve.locations
+            ]
+    assert ask(client, flat, "boundaries").json()["boundaries"] == []
+
+
 def test_tables_leave_positions_empty(client: TestClient, flat: str) -> None:
     _, *rows = ask(client, flat, "path", "?format=csv", source=0, target=14).text.splitlines()
     assert all(row.split(",")[3:6] == ["", "", ""] and row.split(",")[6] for row in rows)
+    names, *rows = ask(
+        client, flat, "isolines", "?format=csv", sources=[0], levels=[9.0, 0.1]
+    ).text.splitlines()
+    assert names == "level,line,closed,length,point,x,y,z,face,u,v,w"
+    assert rows[0] == "9.0" + "," * 11
+    assert all(row.split(",")[5:8] == ["", "", ""] and row.split(",")[8] for row in rows[1:])
     body = {"starts": [0], "directions": [0.3], "lengths": [1.0]}
     rows = np.load(BytesIO(ask(client, flat, "trace", "?format=npy", **body).content))
     assert np.isnan(rows[:, 4:7]).all()
@@ -109,8 +140,9 @@ def test_tables_leave_positions_empty(client: TestClient, flat: str) -> None:
         ("path?format=npy", {"source": 0, "target": 9}, []),
         ("path?format=obj", {"source": 0, "target": 9}, []),
         ("paths?format=obj", {"source": 0, "targets": [9]}, []),
-        ("isolines", {"sources": [0], "count": 2}, []),
-        ("borders", {"sources": [0, 9]}, []),
+        ("isolines?format=obj", {"sources": [0], "count": 2}, []),
+        ("borders?format=obj", {"sources": [0, 9]}, []),
+        ("boundaries?format=obj", {"barriers": [0]}, []),
         ("locate", {"points": [[0, 0, 0]]}, ["/points"]),
         ("log-map", {"source": 0, "x_axis": [1, 0, 0]}, ["/x_axis"]),
         ("log-map?format=ply", {"source": 0}, []),

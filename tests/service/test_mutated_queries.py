@@ -36,11 +36,13 @@ MORE_SEEDS: Mapping[str, tuple[Any, ...]] = {
         },
     ),
     "computeIsolines": (
+        {"values": [0.5, None, -1], "levels": [0], "include": ["locations"]},
         {"sources": [{"vertex": 0}], "count": 5, "method": "approximate", "absolute_error": 0.1},
     ),
     "computeBorders": (
         {"sources": [{"vertex": 0}, {"vertex": 9}], "chord_error": 0.01, "barriers": [7]},
     ),
+    "computeBoundaries": ({"barriers": [7], "include": ["locations"]},),
     "computePath": ({"source": {"vertex": 0}, "target": {"vertex": 9}, "max_distance": 9},),
     "computePathSteps": ({"source": 0, "target": 9, "waypoints": [7], "barriers": [5]},),
     "computePaths": (

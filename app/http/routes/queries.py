@@ -94,8 +94,10 @@ OPERATIONS = (
         queries.IsolinesQuery,
         answers.IsolinesAnswer,
         "computeIsolines",
-        "Lines of equal distance from sources",
-        "Return the polylines of points at each level, exact where they cross edges.",
+        "Lines of equal distance from sources, or of equal values",
+        "Return the polylines of points at each level, exact where they cross edges.\n\nThe values "
+        "are your own, one for each vertex, and of any sign. What is at a level itself counts as "
+        "below it.",
         "The lines of each level, closed and open",
         _LINES,
     ),
@@ -107,6 +109,16 @@ OPERATIONS = (
         "Borders between the territories of sources",
         "Return polylines of points that are equally near to two sources, and no nearer to a "
         "third.\n\nThey are exact where they cross edges and where they meet.",
+        "The lines, closed and open",
+        _LINES,
+    ),
+    Operation(
+        "/boundaries",
+        queries.BoundariesQuery,
+        answers.BoundariesAnswer,
+        "computeBoundaries",
+        "The boundary of the surface, as curves along its edges",
+        "Return the curves of edges with one face, longest first, with the surface on their left.",
         "The lines, closed and open",
         _LINES,
     ),
