@@ -129,13 +129,12 @@ def prune(
                     remove(leftover)
     if as_json:
         removed = [
-            {"reason": leftover.reason, "paths": list(map(str, leftover.paths)), "bytes": size}
-            for leftover, size in going
+            {"paths": list(map(str, leftover.paths)), "bytes": size} for leftover, size in going
         ]
         print_json({"dry_run": dry_run, "removed": removed})
         return
     for leftover, size in going:
-        typer.echo(f"{leftover.reason}: {leftover.paths[0].relative_to(root)}, {size} bytes")
+        typer.echo(f"{leftover.paths[0].relative_to(root)}, {size} bytes")
     verb = "to remove" if dry_run else "removed"
     typer.echo(f"{verb:12}{len(going)}, {sum(size for _, size in going)} bytes")
 

@@ -2,7 +2,7 @@
 
 import shutil
 from collections import Counter
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -56,9 +56,8 @@ class Contents:
 
 @dataclass(frozen=True)
 class Leftover:
-    """Files that nothing needs any more, and why."""
+    """Files that nothing needs any more."""
 
-    reason: str
     paths: tuple[Path, ...]
 
     @property
@@ -169,26 +168,24 @@ def leftovers(root: Path, code: str, jobs: Iterable[Job]) -> Iterator[Leftover]:
     Yields
     ------
     Leftover
-        The files of one reason. The result of a job is none, unless it is damaged.
+        Files that go together. The result of a job is none, unless it is damaged.
     """
     meshes, of_jobs = set(MeshStore(root).ids()), {job.result for job in jobs}
     results, fields, files = _complete_results(root), field_files(root), ResultFiles(Folder(root))
     for name, paths in results.items():
         found = files.read_now(name)
-        if found is None or name not in of_jobs:
-            written_by = None if found is None else found.manifest.code
-            reason = _reason(name, written_by, meshes, code)
-            if reason is not None:
-                yield Leftover(reason, paths)
+        if found is not None and name in of_jobs:
+            continue
+        if found is None or found.manifest.code != code or paths[0].parent.name not in meshes:
+            yield Leftover(paths)
     for path in fields:
-        reason = _reason(_field_name(path), code_of_field(path), meshes, code)
-        if reason is not None:
-            yield Leftover(reason, (path,))
+        if code_of_field(path) != code or path.parent.name not in meshes:
+            yield Leftover((path,))
     complete = {*fields, *(path for paths in results.values() for path in paths)}
     folders = (root / TEMPORARY, *(root / RESULTS).glob("*"), *(root / FIELDS).glob("*"))
     for path in (path for folder in folders for path in folder.glob("*")):
         if path not in complete:
-            yield Leftover("half-written", (path,))
+            yield Leftover((path,))
 
 
 def _complete_results(root: Path) -> dict[str, tuple[Path, Path]]:
@@ -203,15 +200,6 @@ def _complete_results(root: Path) -> dict[str, tuple[Path, Path]]:
 
 def _field_name(path: Path) -> str:
     return f"{path.parent.name}/{path.stem}"
-
-
-def _reason(name: str, written_by: str | None, meshes: Container[str], code: str) -> str | None:
-    """Return why a result or a field can be removed, if it can; no code wrote a damaged one."""
-    if written_by is None:
-        return "damaged"
-    if name.partition("/")[0] not in meshes:
-        return "of a mesh that is gone"
-    return "outdated" if written_by != code else None
 
 
 def remove(leftover: Leftover) -> None:

@@ -11,7 +11,6 @@ from typing import Any
 
 from anyio import to_thread
 
-from app.access import Caller
 from app.engine.interface import Engine
 from app.engine.supplied import SuppliedEngine
 from app.engine.work import MeshInput, StoreMesh, Task
@@ -26,11 +25,11 @@ from app.service.request_context import RequestContext
 from app.service.resources import share_arenas
 from app.service.time_limit import time_limit
 from app.settings import Settings
-from app.state import Allowances, Database, MeshRecords
+from app.state import Database
 from app.store import layout
 from app.store.choice import store_of
 from app.store.fields import FieldStore
-from app.store.mesh_catalog import MeshCatalog
+from app.store.mesh_catalog import MeshCatalog, MeshTables
 from app.store.mesh_index import MeshIndex
 from app.store.ownership import Share
 from app.store.results import ResultStore
@@ -69,7 +68,7 @@ class Service:
             self.store.meshes,
             settings.store_bytes,
             evicts=settings.store_evict == "lru",
-            shared=MeshRecords(self.database) if self.database.is_shared else None,
+            shared=_mesh_records(self.database),
         )
         self.mesh_index = MeshIndex(self.store.meshes)
         self.results = ResultStore(
@@ -81,10 +80,6 @@ class Service:
         self.fields = FieldStore(settings.folder, settings.fields_bytes)
         self.engine = _engine(settings, self.store)
         self.engine.on_unclaimed = self.results.index_unclaimed
-        self.allowances = (
-            Allowances(self.database, settings.deadline_s) if self.database.is_shared else None
-        )
-        """What callers have taken, where several services count together"""
         repository, ttl_s = JobRepository(self.database), settings.job_ttl
         retention = Retention(self.results, ttl_s)
         self.jobs = JobManager(repository, self.results, retention)
@@ -101,7 +96,7 @@ class Service:
         self.job_runner = JobRunner(
             repository, self.results, retention, ttl_s, self.query_jobs.solve, self.jobs.notify
         )
-        self._uploads = ConcurrencyLimit(
+        self.uploads = ConcurrencyLimit(
             settings.quota_uploads, "quota_exceeded", "uploads", "quota_uploads"
         )
         self.is_leaving = False
@@ -195,16 +190,6 @@ class Service:
         self.engine.drain()
         self.jobs.end_events()
 
-    @asynccontextmanager
-    async def counting_upload(self, caller: Caller) -> AsyncIterator[None]:
-        """Count the block as an upload of a caller, or refuse it with ``quota_exceeded``."""
-        if self.allowances is None:
-            with self._uploads.counting(caller):
-                yield
-        else:
-            async with self._uploads.counting_for_all(caller, self.allowances):
-                yield
-
     async def add_mesh(
         self, mesh_input: MeshInput, name: str | None, context: RequestContext
     ) -> StoredMesh:
@@ -271,6 +256,15 @@ def _engine(settings: Settings, store: Store) -> Engine:
 
     engine = LocalEngine(settings, settings.folder / layout.RESULTS)
     return engine if store.supply is None else SuppliedEngine(engine, store.supply)
+
+
+def _mesh_records(database: Database) -> MeshTables | None:
+    """Return the table of meshes that several services share, if there are several."""
+    if not database.is_shared:
+        return None
+    from app.state.mesh_records import MeshRecords  # words of PostgreSQL, a tenth of a second
+
+    return MeshRecords(database)
 
 
 def _database_of(settings: Settings) -> Database:

@@ -62,7 +62,7 @@ queries = Table(  # apart from jobs, since they may be large, and records change
     Column("query", LargeBinary, nullable=False),
 )
 
-# The next are used only where several services share PostgreSQL.
+# The next is used only where several services share PostgreSQL.
 
 CLOCK = cast(extract("epoch", func.clock_timestamp()), Double)
 """The seconds since 1970 by the clock of the database"""
@@ -74,22 +74,6 @@ meshes = Table(
     Column("size", BigInteger, nullable=False),
     Column("used", Double, nullable=False),
     Column("pinned", Double, nullable=False),
-)
-
-rates = Table(
-    "rates",
-    metadata,
-    Column("caller", Text, primary_key=True),
-    Column("due", Double, nullable=False),
-)
-
-work = Table(
-    "work",
-    metadata,
-    Column("id", Text, primary_key=True),
-    Column("kind", Text, nullable=False),
-    Column("caller", Text, nullable=False),
-    Column("ends", Double, nullable=False),
 )
 
 revision = Table(  # Alembic's own

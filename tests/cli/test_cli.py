@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import trimesh
 import uvicorn
 from fastapi import FastAPI
 from scipy.sparse import load_npz
@@ -99,20 +98,6 @@ def rows_of(name: str) -> list[dict[str, str]]:
     return list(csv.DictReader(Path(name).read_text().splitlines()))
 
 
-def test_distances_on_the_mesh(run: Run, plane: Path) -> None:
-    expected = gc.exact_distance(gc.load_mesh(plane), 0, 0.35).distances
-    args = ("--source", 0, "--max-distance", 0.35)
-    assert run("distance", plane, *args, "--out", "d.PLY").code == 0
-    mesh = trimesh.load("d.PLY", process=False)
-    assert mesh.faces.tolist() == gc.load_mesh(plane).faces.tolist()
-    assert mesh.metadata["_ply_raw"]["vertex"]["data"]["distance"].tolist() == expected.tolist()
-    assert run("distance", plane, *args, "--out", "d.csv").code == 0
-    rows = rows_of("d.csv")
-    reached = np.isfinite(expected)
-    assert [bool(row["distance"]) for row in rows] == reached.tolist()
-    assert [float(row["distance"]) for row in rows if row["distance"]] == expected[reached].tolist()
-
-
 @pytest.mark.slow
 def test_lines_in_each_format(run: Run, knot: Path) -> None:
     """What the formats hold is checked over HTTP: the encoders are the same."""
@@ -157,13 +142,6 @@ def knot(run: Run) -> Path:
     """A curved mesh, on which windows merge."""
     assert run("sample", "knot", "--faces", 3000, "knot.ply").code == 0
     return Path("knot.ply")
-
-
-def test_exact_distances_have_no_error(run: Run, plane: Path) -> None:
-    for options in ([], ["--method", "exact"]):
-        ran = run("distance", plane, "--source", 0, *options, "--out", "d.json")
-        assert ran.figure("error bound") == "0.0 (relative, guaranteed)"
-        assert json.loads(Path("d.json").read_text())["error_bound"]["value"] == 0
 
 
 def test_path_writes_a_polyline_and_json(run: Run, plane: Path) -> None:
@@ -230,29 +208,6 @@ def test_a_path_by_way_of_others_tells_its_steps(run: Run, plane: Path) -> None:
     assert [step["faces"] for step in answer["steps"]] == [
         step.faces.tolist() for step in expected.steps
     ]
-
-
-@pytest.mark.slow
-def test_all_spellings_of_a_point_give_one_answer(run: Run, knot: Path) -> None:
-    mesh = gc.load_mesh(knot)
-    start, end = mesh.faces[900, :2].tolist()
-    at_start = ",".join(map(repr, mesh.vertices[start].tolist()))
-    one = ["--out", "d.json", "--source", "f40:0.2,0.3,0.5", "--source"]
-    answers, paths = set(), set()
-    for text in (start, f"v{start}", f"e{start}-{end}:0", f"e{end}-{start}:1", f"p{at_start}"):
-        assert run("distance", knot, *one, text).code == 0
-        answer = json.loads(Path("d.json").read_text())
-        answers.add(json.dumps(answer))
-        stops = ["--source", text, "--target", 7, "--via", "v30", "--via", text]
-        assert run("path", knot, *stops, "--out", "p.obj").code == 0
-        paths.add(Path("p.obj").read_text())
-    assert (len(answers), len(paths)) == (1, 1)
-    place = {"vertex": start, "position": mesh.vertices[start].tolist(), "start_distance": 0.0}
-    assert answer["sources"][1] == place
-    assert answer["sources"][0]["face"] == 40
-    assert answer["sources"][0]["barycentric"] == [0.2, 0.3, 0.5]
-    sources = [gc.SurfacePoint.face(40, (0.2, 0.3, 0.5)), start]
-    assert answer["distances"] == gc.exact_distance(mesh, sources).distances.tolist()
 
 
 def test_locate_prints_a_point_that_others_take(run: Run, knot: Path) -> None:
@@ -339,20 +294,6 @@ def test_matrices_are_the_library_s(run: Run, knot: Path, limit: float | None) -
     assert list(zip(*columns, strict=True)) == near
 
 
-def test_pairs(run: Run, knot: Path) -> None:
-    expected = gc.distance_matrix(gc.load_mesh(knot), [3, 9], [700, 20], layout="pairs")
-    ends = [*point_options("--source", 3, 9), *point_options("--target", 700, 20)]
-    for name in ("d.npy", "d.csv", "d.json"):
-        ran = run("matrix", knot, *ends, "--layout", "pairs", "--out", name)
-        assert ran.figure("reached") == "2 of 2 distances"
-    assert np.load("d.npy").tolist() == expected.tolist()
-    assert json.loads(Path("d.json").read_text())["distances"] == expected.tolist()
-    rows = [row.split(",") for row in Path("d.csv").read_text().splitlines()]
-    assert rows[0] == ["source", "target", "distance"]
-    found = [(int(i), int(j), float(d)) for i, j, d in rows[1:]]
-    assert found == [(i, i, d) for i, d in enumerate(expected.tolist())]
-
-
 def test_nearest_prints_candidates_as_they_were_written(run: Run, knot: Path) -> None:
     texts = ["700", "f40:0.2,0.3,0.5", "v20", "9"]
     places = [700, gc.SurfacePoint.face(40, (0.2, 0.3, 0.5)), 20, 9]
@@ -410,11 +351,6 @@ def test_a_path_stops_at_max_distance(run: Run, knot: Path, method: str) -> None
     assert beyond.code == 1
     assert "within --max-distance" in error_line(beyond)
     assert float(within.figure("length")) == pytest.approx(length, rel=1e-3)
-
-
-def test_a_path_to_its_own_source_is_a_point(run: Run, plane: Path) -> None:
-    assert run("path", plane, "--source", 7, "--target", 7, "--out", "p.obj").code == 0
-    assert Path("p.obj").read_text().splitlines()[-1] == "p 1"
 
 
 def test_merge_joins_a_cut_mesh(run: Run) -> None:
@@ -747,14 +683,6 @@ def test_isolines_are_drawn(run: Run, plane: Path) -> None:
     for level, lines in zip(drawn, expected, strict=True):
         assert [line["points"] for line in level["lines"]] == [i.points.tolist() for i in lines]
         assert [line["closed"] for line in level["lines"]] == [i.closed for i in lines]
-    rows = Path("lines.obj").read_text().splitlines()
-    groups = [row for row in rows if row.startswith("g")]
-    assert groups == ["g level_0.3", "g level_0.6"]
-    circle, *arcs = ([int(i) for i in row.split()[1:]] for row in rows if row.startswith("l"))
-    assert circle[0] == circle[-1] == 1
-    assert len(circle) - 1 == len(expected[0][0].points)
-    joined = [i for indices in (circle[:-1], *arcs) for i in indices]
-    assert joined == list(range(1, len(joined) + 1)), "each vertex in turn, and none twice"
     spaced = run("isolines", plane, "--source", 60, "--count", 2, "--out", "lines.json")
     assert spaced.out.count("level ") == 2
     rough = run(

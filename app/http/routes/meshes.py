@@ -132,7 +132,7 @@ async def create_mesh(
     `not_embedded`.
     """
     refuse_idempotency_key(request)
-    async with service.counting_upload(context.caller):
+    with service.uploads.counting(context.caller):
         if parameters.sample is None:
             stored = await _add_upload(service, parameters, request, context)
         else:

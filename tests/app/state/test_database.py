@@ -17,7 +17,7 @@ from sqlalchemy import Connection, insert, select, text
 
 from app.jobs import JobRepository, read_jobs
 from app.state import Database, StateError
-from app.state.schema import HEAD, metadata, rates
+from app.state.schema import HEAD, metadata, queries
 from tests.support.jobs import new_job
 from tests.support.paths import ROOT
 
@@ -46,7 +46,7 @@ async def test_a_transaction_that_fails_or_is_cancelled_leaves_nothing(database:
 
     async def change(error: BaseException | None) -> None:
         async with database.transaction() as connection:
-            await connection.execute(insert(rates).values(caller="x", due=1.0))
+            await connection.execute(insert(queries).values(job_id="x", query=b""))
             has_changed.set()
             if error is not None:
                 raise error
@@ -60,7 +60,7 @@ async def test_a_transaction_that_fails_or_is_cancelled_leaves_nothing(database:
     task.cancel()
     await asyncio.wait({task})
     async with database.transaction() as connection:
-        assert (await connection.execute(select(rates))).all() == []
+        assert (await connection.execute(select(queries))).all() == []
 
 
 def differences(connection: Connection) -> list[Any]:
@@ -78,6 +78,7 @@ async def test_revisions_lead_to_the_tables_of_the_schema(
         await connection.execute(text("CREATE INDEX jobs_of_key ON jobs (status)"))
         for table in ("jobs", "meshes"):
             await connection.execute(text(f"ALTER TABLE {table} ADD COLUMN owner TEXT"))
+        await connection.execute(text("CREATE TABLE rates (caller TEXT PRIMARY KEY)"))
         await connection.execute(text("UPDATE alembic_version SET version_num = '0002'"))
         assert await connection.run_sync(differences) != []
     Database(tmp_path / "jobs.sqlite3", state_url).prepare()

@@ -7,7 +7,8 @@ import pytest
 
 import geodesic_core as gc
 from app.errors import ProblemError
-from app.state import Database, MeshRecords
+from app.state import Database
+from app.state.mesh_records import MeshRecords
 from app.store.mesh_catalog import CatalogChange, MeshCatalog
 from app.store.meshes import MeshStore
 from app.store.store import Store
