@@ -180,7 +180,8 @@ class ScalarField:
         (3.0, [1.0, 0.5])
         """
         found = [self._at(point, f"point {i}") for i, point in enumerate(each_of(points, "point"))]
-        return as_given(points, found) if np.ndim(points) == 0 else np.array(found)
+        one_or_all = as_given(points, found)
+        return np.array(found) if one_or_all is found else one_or_all
 
     def _at(self, given: Point, name: str) -> float:
         point = self.mesh.point(given, name)

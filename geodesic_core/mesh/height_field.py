@@ -68,7 +68,7 @@ class HeightField:
         return face, point
 
     def _height_in(self, hit: int, foot: list[float]) -> float:
-        """Return the height of a face above a place: what the tree returns is rounded to float32."""
+        """Return the height of a face above a place; the tree rounds its own to float32."""
         vertices, faces = self._arrays
         a, b, c = vertices[faces[hit]]
         x, y, z = np.cross(b - a, c - a)
