@@ -98,8 +98,10 @@ export interface paths {
         get?: never;
         put?: never;
         /**
-         * Lines of equal distance from sources
+         * Lines of equal distance from sources, or of equal values
          * @description Return the polylines of points at each level, exact where they cross edges.
+         *
+         *     The values are your own, one for each vertex, and of any sign. What is at a level itself counts as below it.
          */
         post: operations["computeIsolines"];
         delete?: never;
@@ -124,6 +126,26 @@ export interface paths {
          *     They are exact where they cross edges and where they meet.
          */
         post: operations["computeBorders"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/meshes/{mesh_id}/boundaries": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * The boundary of the surface, as curves along its edges
+         * @description Return the curves of edges with one face, longest first, with the surface on their left.
+         */
+        post: operations["computeBoundaries"];
         delete?: never;
         options?: never;
         head?: never;
@@ -587,6 +609,35 @@ export interface components {
          */
         BorderDocument: {
             /**
+             * Closed
+             * @description Whether the line leads from its last point back to the first, which is not repeated
+             */
+            closed: boolean;
+            /**
+             * Length
+             * @description The length in mesh units
+             */
+            length: number;
+            /**
+             * Points
+             * @description Null on a mesh that is given by the lengths of its edges alone
+             */
+            points: [
+                number,
+                number,
+                number
+            ][] | null;
+            /**
+             * Faces
+             * @description The face of each segment
+             */
+            faces: number[];
+            /**
+             * Locations
+             * @description The points again, on the surface: if included, and on a mesh without positions
+             */
+            locations?: components["schemas"]["Location"][] | null;
+            /**
              * Sources
              * @description The two sources whose territories the line separates: indices into `sources`, the lower first
              */
@@ -594,24 +645,6 @@ export interface components {
                 number,
                 number
             ];
-            /**
-             * Closed
-             * @description Whether the line leads from its last point back to the first, which is not repeated
-             */
-            closed: boolean;
-            /** Length */
-            length: number;
-            /** Points */
-            points: [
-                number,
-                number,
-                number
-            ][];
-            /**
-             * Faces
-             * @description The face of each segment
-             */
-            faces: number[];
         };
         /**
          * BordersAnswer
@@ -668,6 +701,11 @@ export interface components {
              *     ]
              */
             barriers?: number[];
+            /**
+             * Include
+             * @description `locations`: also the points of lines as faces and weights. On a mesh without positions they come in any case. Default: `[]`
+             */
+            include?: "locations"[];
             /** Sources */
             sources: (number | components["schemas"]["VertexSource"] | components["schemas"]["EdgeSource"] | components["schemas"]["FaceSource"] | components["schemas"]["PositionSource"] | components["schemas"]["CurveSource"])[];
             /**
@@ -680,6 +718,87 @@ export interface components {
              * @description Largest distance of the returned chords from the exact lines, which are mostly hyperbolas inside faces, in mesh units. At least a billionth of the bounding box's diagonal; a thousandth of the mean edge length if not given
              */
             chord_error?: number | null;
+        };
+        /**
+         * BoundariesAnswer
+         * @description The boundary of the surface, longest curve first; empty for a surface without boundary.
+         */
+        BoundariesAnswer: {
+            /**
+             * Kind
+             * @constant
+             */
+            kind: "boundaries";
+            /** Mesh Id */
+            mesh_id: string;
+            /**
+             * Boundaries
+             * @description Closed lines, and open lines that end at an edge of three faces or more
+             */
+            boundaries: components["schemas"]["BoundaryDocument"][];
+            /** Warnings */
+            warnings: string[];
+        };
+        /**
+         * BoundariesRequest
+         * @description The boundary of the surface. Blocked faces are no part of it: their rim is a boundary.
+         * @example {}
+         */
+        BoundariesRequest: {
+            /**
+             * Barriers
+             * @description Indices of blocked faces. They act as holes, and paths may bend at their corners. Default: `[]`
+             * @example [
+             *       7,
+             *       8
+             *     ]
+             */
+            barriers?: number[];
+            /**
+             * Include
+             * @description `locations`: also the points of lines as faces and weights. On a mesh without positions they come in any case. Default: `[]`
+             */
+            include?: "locations"[];
+        };
+        /**
+         * BoundaryDocument
+         * @description A polyline of boundary edges, with the surface on its left.
+         */
+        BoundaryDocument: {
+            /**
+             * Closed
+             * @description Whether the line leads from its last point back to the first, which is not repeated
+             */
+            closed: boolean;
+            /**
+             * Length
+             * @description The length in mesh units
+             */
+            length: number;
+            /**
+             * Points
+             * @description Null on a mesh that is given by the lengths of its edges alone
+             */
+            points: [
+                number,
+                number,
+                number
+            ][] | null;
+            /**
+             * Faces
+             * @description The face of each segment
+             */
+            faces: number[];
+            /**
+             * Locations
+             * @description The points again, on the surface: if included, and on a mesh without positions
+             */
+            locations?: components["schemas"]["Location"][] | null;
+            /**
+             * Vertices
+             * @description The vertex at each point
+             */
+            vertices: number[];
         };
         /**
          * Curve
@@ -1028,7 +1147,7 @@ export interface components {
         };
         /**
          * IsolineDocument
-         * @description A polyline of points at one distance.
+         * @description A polyline of points at one distance, or of one value.
          */
         IsolineDocument: {
             /**
@@ -1036,39 +1155,52 @@ export interface components {
              * @description Whether the line leads from its last point back to the first, which is not repeated
              */
             closed: boolean;
-            /** Length */
+            /**
+             * Length
+             * @description The length in mesh units
+             */
             length: number;
-            /** Points */
+            /**
+             * Points
+             * @description Null on a mesh that is given by the lengths of its edges alone
+             */
             points: [
                 number,
                 number,
                 number
-            ][];
+            ][] | null;
             /**
              * Faces
              * @description The face of each segment
              */
             faces: number[];
+            /**
+             * Locations
+             * @description The points again, on the surface: if included, and on a mesh without positions
+             */
+            locations?: components["schemas"]["Location"][] | null;
         };
         /**
          * IsolineLevel
-         * @description The lines at one distance.
+         * @description The lines at one distance, or of one value.
          */
         IsolineLevel: {
             /**
              * Level
-             * @description The distance in mesh units
+             * @description The distance in mesh units, or the value
              */
             level: number;
             /**
              * Lines
-             * @description Closed lines, and open lines that end at the boundary or at an edge of three faces or more; empty if no point is at that distance
+             * @description Closed lines, and open lines that end at the boundary or at an edge of three faces or more, or where values are missing; empty if no point is at that level
              */
             lines: components["schemas"]["IsolineDocument"][];
         };
         /**
          * IsolinesAnswer
          * @description The lines of each level, in the order of the levels.
+         *
+         *     Of values they are exact, with an error bound and a chord error of 0, without sources.
          */
         IsolinesAnswer: {
             /**
@@ -1103,7 +1235,9 @@ export interface components {
         };
         /**
          * IsolinesRequest
-         * @description Lines of equal distance from the nearest of ``sources``: at ``levels``, or at ``count``.
+         * @description Lines of equal distance from the nearest of ``sources``, or of equal ``values``.
+         *
+         *     They are drawn at ``levels``, or at ``count`` of them.
          * @example {
          *       "count": 10,
          *       "sources": [
@@ -1126,6 +1260,17 @@ export interface components {
          *         }
          *       ]
          *     }
+         * @example {
+         *       "levels": [
+         *         0
+         *       ],
+         *       "values": [
+         *         0.5,
+         *         -1,
+         *         null,
+         *         2
+         *       ]
+         *     }
          */
         IsolinesRequest: {
             /**
@@ -1137,6 +1282,11 @@ export interface components {
              *     ]
              */
             barriers?: number[];
+            /**
+             * Include
+             * @description `locations`: also the points of lines as faces and weights. On a mesh without positions they come in any case. Default: `[]`
+             */
+            include?: "locations"[];
             /**
              * Method
              * @description `fast` is not available: lines need windows, which it does not have. Default: `exact`
@@ -1153,16 +1303,24 @@ export interface components {
              * @description For `approximate`: the allowed error in mesh units; if both errors are given, both hold
              */
             absolute_error?: number | null;
-            /** Sources */
-            sources: (number | components["schemas"]["VertexSource"] | components["schemas"]["EdgeSource"] | components["schemas"]["FaceSource"] | components["schemas"]["PositionSource"] | components["schemas"]["CurveSource"])[];
+            /**
+             * Sources
+             * @description Where distances start, at least one; give these or `values`. Default: `[]`
+             */
+            sources?: (number | components["schemas"]["VertexSource"] | components["schemas"]["EdgeSource"] | components["schemas"]["FaceSource"] | components["schemas"]["PositionSource"] | components["schemas"]["CurveSource"])[];
+            /**
+             * Values
+             * @description A number for each vertex, linear on each face, or `null` where there is none. Goes without `sources` and all that is about distances: `method` with its errors, `max_distance` and `chord_error`. Lines have the higher values on their left
+             */
+            values?: (number | null)[] | null;
             /**
              * Levels
-             * @description Distances in mesh units; give these or `count`
+             * @description Distances in mesh units, greater than 0, or any values; give these or `count`
              */
             levels?: number[] | null;
             /**
              * Count
-             * @description Number of levels, evenly spaced between 0 and the largest distance of a reachable vertex, both left out
+             * @description Number of levels, evenly spaced between 0 and the largest distance of a reachable vertex, or between the lowest and the highest of `values`, both left out
              */
             count?: number | null;
             /**
@@ -3396,6 +3554,119 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["BordersAnswer"];
+                    "model/obj": string;
+                    "text/csv": string;
+                };
+            };
+            /** @description With `Prefer: respond-async`: the job */
+            202: {
+                headers: {
+                    Location: components["headers"]["Location"];
+                    "Preference-Applied": components["headers"]["Preference-Applied"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobDocument"];
+                };
+            };
+            /** @description The requested range */
+            206: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Content-Range": components["headers"]["Content-Range"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": string;
+                    "model/obj": string;
+                    "text/csv": string;
+                };
+            };
+            /** @description malformed_body, idempotency_key_unused, malformed_request */
+            400: components["responses"]["Problem"];
+            /** @description unauthorized */
+            401: components["responses"]["Unauthorized"];
+            /** @description origin_not_allowed */
+            403: components["responses"]["Problem"];
+            /** @description mesh_not_found */
+            404: components["responses"]["Problem"];
+            /** @description not_acceptable */
+            406: components["responses"]["Problem"];
+            /** @description upload_too_large, result_too_large */
+            413: components["responses"]["Problem"];
+            /** @description unsupported_media_type */
+            415: components["responses"]["Problem"];
+            /** @description range_not_satisfiable */
+            416: components["responses"]["Problem"];
+            /** @description host_not_allowed */
+            421: components["responses"]["Problem"];
+            /** @description invalid_point, not_embedded, invalid_request, limit_exceeded, memory_limit */
+            422: components["responses"]["Problem"];
+            /** @description quota_exceeded, rate_limited */
+            429: components["responses"]["ProblemForNow"];
+            /** @description header_too_large */
+            431: components["responses"]["Problem"];
+            /** @description worker_died, mesh_damaged, internal_error */
+            500: components["responses"]["Problem"];
+            /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
+            503: components["responses"]["ProblemForNow"];
+            /** @description deadline_exceeded */
+            504: components["responses"]["Problem"];
+            /** @description storage_full, quota_exceeded */
+            507: components["responses"]["Problem"];
+        };
+    };
+    computeBoundaries: {
+        parameters: {
+            query?: {
+                /** @description Overrides `Accept` */
+                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv";
+                /** @description Type of the numbers in `npy`, `npz` and `octets` */
+                dtype?: "float64" | "float32";
+            };
+            header?: {
+                /** @description The longest time that the client waits, in milliseconds; it bounds no job */
+                "x-timeout-ms"?: number;
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
+                prefer?: string;
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job. With `Prefer: respond-async` only */
+                "idempotency-key"?: string;
+                /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
+                Range?: string;
+            };
+            path: {
+                mesh_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["BoundariesRequest"];
+            };
+        };
+        responses: {
+            /** @description The lines, closed and open. In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` names what is too long for one */
+            200: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BoundariesAnswer"];
                     "model/obj": string;
                     "text/csv": string;
                 };

@@ -79,7 +79,7 @@ def test_numbers_in_quotes_are_refused(kind: str) -> None:
     assert accepted == []
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", sorted(KINDS.keys() - {"boundaries"}))
 def test_integers_are_numbers_as_well(kind: str) -> None:
     body = read_body(kind, BODIES[kind])
     (given,) = BODIES[kind]["lengths"] if kind == "trace" else [BODIES[kind]["max_distance"]]
