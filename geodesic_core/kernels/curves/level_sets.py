@@ -49,7 +49,9 @@ def chain_level_set(topology: Any, values: Floats, level: float) -> tuple[Ints, 
                 tail, head = values[links[h, TAIL]], values[links[h, HEAD]]
                 side = 0 if tail <= level else 1  # where it enters the face, and leaves it
                 low, high = min(tail, head), max(tail, head)
-                row, share = 2 * chain_count + side, (level - low) / (high - low)
+                row = 2 * chain_count + side
+                # By halves: a difference may be beyond all numbers.
+                share = (0.5 * level - 0.5 * low) / (0.5 * high - 0.5 * low)
                 chains.weights[row, k] = share if side == 1 else 1.0 - share
                 chains.weights[row, following] = 1.0 - share if side == 1 else share
                 chains.weights[row, (k + 2) % 3] = 0.0

@@ -116,6 +116,12 @@ def test_ties_of_whole_numbers(heights: list[int], level: int) -> None:
         check_locations(mesh, line)
 
 
+def test_values_may_be_as_large_as_numbers_are() -> None:
+    mesh = gc.samples.plane(2)
+    (line,) = gc.ScalarField(mesh, [-1.7e308, 1.7e308, -1.7e308, 1.7e308]).isolines([0.85e308])[0]
+    np.testing.assert_allclose(line.points[:, 0], 0.75, atol=1e-15)
+
+
 def test_gradients_are_those_of_a_linear_function() -> None:
     mesh = gc.samples.knot(500)
     found = gc.ScalarField(mesh, mesh.vertices @ DIRECTION + 3.0).gradient()
