@@ -7,6 +7,8 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.cutting import retriangulation
+from geodesic_core.cutting.cut import cut_along
+from geodesic_core.cutting.lines import Line
 from geodesic_core.errors import InternalError, InvalidArgument, InvalidMesh, InvalidPoint
 from geodesic_core.kernels.cutting.predicates import STEPS, twice_area
 from geodesic_core.kernels.outcome import Outcome
@@ -314,6 +316,48 @@ def test_many_chords_of_one_face():
     curves = [gc.Curve([a, b]) for a, b in zip(sides[0], sides[1][::-1] + sides[2], strict=False)]
     curves += [gc.Curve([a, b]) for a, b in zip(sides[1], sides[2], strict=True)]
     check_cut(mesh, curves)
+
+
+def test_a_crossing_beside_an_edge_is_a_point_of_it_in_all_its_faces():
+    mesh = gc.samples.plane(2)
+    curves = [
+        gc.Curve(
+            [gc.SurfacePoint.face(0, (weight, 0.06, 0.94 - weight)), mesh.point_on_edge(0, 3, t)]
+        )
+        for weight, t in ((0.1, 0.5), (0.9, 0.5 + 10.0 * MERGE))
+    ]
+    cut = gc.cut(mesh, curves, separate=False)
+    at = np.array([point.barycentric for point in cut.location_of[4:]])
+    crossing = at[(at[:, 1] == 0.0) & (np.abs(at[:, 2] - 0.5 - 5.0 * MERGE) < MERGE)]
+    assert len(crossing) == 1
+    check_cut(mesh, curves)
+
+
+def test_points_whose_faces_meet_elsewhere_are_joined_there_or_refused():
+    mesh = gc.samples.plane(2)
+    inside, on_edge = (0.2, 0.3, 0.5), (0.5, 0.0, 0.5)
+
+    def cut_in(
+        faces: list[int], weights: list[tuple[float, float, float]], face: int
+    ) -> gc.CutMesh:
+        line = Line(np.array(faces), np.array(weights), np.array([face]), closed=False)
+        return cut_along(mesh, [line], gc.Control(), separate=False)
+
+    assert np.array_equal(
+        cut_in([0, 0], [inside, on_edge], 1).faces, cut_in([0, 0], [inside, on_edge], 0).faces
+    )
+    with pytest.raises(InvalidPoint, match="the points 0 and 1 of curve 0 have no face in common"):
+        cut_in([0, 1], [inside, inside], 0)
+
+
+def test_a_closed_line_ends_where_it_begins():
+    mesh = gc.samples.plane(2)
+    weights = np.array([(0.6, 0.2, 0.2), (0.2, 0.6, 0.2), (0.2, 0.2, 0.6)])
+    line = Line(np.zeros(3, int), weights, np.zeros(3, int), closed=True)
+    cut = cut_along(mesh, [line], gc.Control(), separate=True)
+    assert len(cut.curve_edges) == 3
+    assert cut.parts.max() == 1
+    assert "edges of curves" in cut._repr_html_()
 
 
 def test_what_is_no_curve_is_refused():
