@@ -84,7 +84,9 @@ class IsolinesQuery(FromSources[IsolinesRequest]):
             _refuse_members_of_distances(request)
             return request
         if not request.sources:
-            raise invalid_fields(["/sources"], "give sources, at least one, or values")
+            are_missing = "sources" not in request.model_fields_set
+            message = "give sources, or values" if are_missing else "give at least one source"
+            raise invalid_fields(["/sources"], message)
         _refuse_levels_below_0(request)
         return with_default_accuracy(request)
 

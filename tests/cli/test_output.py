@@ -168,7 +168,7 @@ def test_a_command_that_is_missing_shows_the_help(run: Run, group: list[str]) ->
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ("isolines plane.ply --source 0 --level -1", "--level is -1.0: it must be above 0"),
+        ("isolines plane.ply --source 0 --level -1", "--level: a distance must be greater than 0"),
         ("isolines plane.ply --source 0 --level nan", "--level is nan: it must be a finite numb"),
         (
             "isolines plane.ply --source 0 --count 1 --chord-error 0",

@@ -309,6 +309,7 @@ def test_signs_of_areas_are_exact():
         assert abs(found - exact) <= 1e-15 * products
 
 
+@pytest.mark.jit
 def test_many_chords_of_one_face():
     mesh = gc.samples.plane(2)
     t = np.linspace(0.01, 0.99, 60)

@@ -5,7 +5,7 @@ import pytest
 
 from tests.support.cuts import KINDS, check_cut, random_curves, random_mesh
 
-pytestmark = [pytest.mark.jit, pytest.mark.slow, pytest.mark.slice(40)]
+pytestmark = [pytest.mark.jit, pytest.mark.slow, pytest.mark.slice(20)]
 
 
 @pytest.mark.parametrize("seed", range(1000))
