@@ -192,7 +192,9 @@ def check_place(problem: Any, sent: Sent) -> None:
     for fault in faults:
         if not fault["pointer"].startswith(("/header/", "/query/")):
             assert sent.body is not None
-            is_missing = fault["message"].startswith(("Field required", "give levels", "give sources, or values"))
+            is_missing = fault["message"].startswith(
+                ("Field required", "give levels", "give sources, or values")
+            )
             assert is_there(json.loads(sent.body), fault["pointer"]) != is_missing, fault
 
 
