@@ -1,8 +1,7 @@
 """The database of a service: SQLite in a file of its store, or PostgreSQL that several share."""
 
-import asyncio
 from collections.abc import AsyncIterator, Iterator, Sequence
-from contextlib import asynccontextmanager, contextmanager, suppress
+from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -147,28 +146,10 @@ class Database:
         Errors are raised as `as_os_errors` says.
         """
         with as_os_errors():
-            connection = await self._checked_out()
-            try:
-                async with connection.begin():
-                    if self.is_shared and lock is not None:
-                        await connection.execute(_alone(lock))
-                    yield connection
-            finally:
-                await connection.close()
-
-    async def _checked_out(self) -> AsyncConnection:
-        """Return a connection of the pool, which is to be closed.
-
-        The pool waits by `asyncio.wait_for`, which may lose what it waited for when it is cancelled
-        (until Python 3.12): the only connection to SQLite would be gone. So it is not cancelled.
-        """
-        waiting = asyncio.ensure_future(self._engine.connect().start())
-        try:
-            return await asyncio.shield(waiting)
-        except asyncio.CancelledError:
-            with suppress(Exception):
-                await (await waiting).close()
-            raise
+            async with self._engine.begin() as connection:
+                if self.is_shared and lock is not None:
+                    await connection.execute(_alone(lock))
+                yield connection
 
 
 def require_intact(path: Path) -> None:

@@ -297,12 +297,19 @@ def store(user: User, upload: Upload) -> bool:
 
 
 def submit(user: User, request: Request) -> str | None:
-    """Send a query as a job; return its link, or None where it was refused."""
+    """Send a query as a job; return its link, or None where it was refused, as anybody may be.
+
+    Where the answer is a fault, which is recorded, the user turns to something else.
+    """
     headers = {**request.headers, **ASYNC}
     response = user.exchange(
         request.operation, "POST", request.path, 202, data=request.body, headers=headers
     )
-    return header_of(response, "location") if response.status_code == 202 else None
+    if response.status_code == 202:
+        return header_of(response, "location")
+    if (response.status_code, code_of(response)) in user.refusals:
+        return None
+    raise locust.exception.RescheduleTask
 
 
 def header_of(response: FastResponse, name: str) -> str:

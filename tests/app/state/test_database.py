@@ -7,6 +7,7 @@ import sqlite3
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, closing, suppress
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import pytest
@@ -61,6 +62,27 @@ async def test_a_transaction_that_fails_or_is_cancelled_leaves_nothing(database:
     await asyncio.wait({task})
     async with database.transaction() as connection:
         assert (await connection.execute(select(queries))).all() == []
+
+
+async def test_transactions_cancelled_at_any_moment_leave_the_connections_to_others(
+    database: Database,
+) -> None:
+    """While they wait for a connection, while they have one, and between; in any order."""
+    random = Random(1)
+
+    async def look() -> None:
+        async with database.transaction() as connection:
+            await connection.execute(select(queries))
+            await asyncio.sleep(0)
+
+    for _ in range(40):
+        tasks = [asyncio.create_task(look()) for _ in range(12)]
+        for _ in range(random.randrange(40)):
+            await asyncio.sleep(random.choice((0.0, 0.0, 1e-3 * random.random())))
+            random.choice(tasks).cancel()
+        found = await asyncio.gather(*tasks, return_exceptions=True)
+        assert {type(each) for each in found} <= {type(None), asyncio.CancelledError}
+    await look()
 
 
 def differences(connection: Connection) -> list[Any]:
