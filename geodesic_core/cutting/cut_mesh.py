@@ -250,7 +250,7 @@ class CutMesh:
         return array[self.face_of] if chosen == ["faces"] else self._interpolated(array)
 
     def _interpolated(self, values: NDArray[Any]) -> Any:
-        """Return values of old vertices for new ones; NaN at a corner of no weight has no say."""
+        """Return values of old vertices for new ones; NaN counts only where a corner has weight."""
         weights = self._locations.weights.reshape(-1, 3, *[1] * (values.ndim - 1))
         at_corners = values[self.old.faces[self._locations.faces]]
         parts = np.where(weights > 0.0, weights * at_corners, 0.0)

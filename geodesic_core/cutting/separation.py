@@ -18,7 +18,7 @@ class Separated(NamedTuple):
     copied: Longs
     """(N,): the vertex of which each new one is a copy"""
     shut: Longs
-    """(S, 2): edges of curves that are joined still, as both their ends are, lower end first"""
+    """(S, 2): edges of curves that are still joined, as both of their ends are; lower end first"""
 
 
 def keys_of(edges: Any) -> Longs:
@@ -34,20 +34,21 @@ def edges_of(keys: Longs) -> Longs:
 
 def joined_half_edges(faces: Longs, is_open: Any) -> tuple[Longs, Longs]:
     """Return pairs of half-edges (3F) of one edge, but for those that are open."""
-    keys = keys_of(_ends_of(faces))
+    keys = keys_of(ends_of(faces))
     closed = np.flatnonzero(~is_open)
     order = closed[np.argsort(keys[closed], kind="stable")]
     same = np.flatnonzero(keys[order[1:]] == keys[order[:-1]])
     return order[same], order[same + 1]
 
 
-def _ends_of(faces: Longs) -> Longs:
+def ends_of(faces: Longs) -> Longs:
+    """Return the ends of the half-edges of faces, (3F, 2)."""
     return np.stack([faces, faces[:, _NEXT]], axis=-1).reshape(-1, 2)
 
 
 def is_on_curve(faces: Longs, curve_edges: Longs) -> Any:
     """Tell which half-edges (3F) of faces are edges of curves."""
-    return np.isin(keys_of(_ends_of(faces)), keys_of(curve_edges))
+    return np.isin(keys_of(ends_of(faces)), keys_of(curve_edges))
 
 
 def parts_of(faces: Longs, curve_edges: Longs) -> Longs:
@@ -80,9 +81,9 @@ def separated(faces: Longs, count: int, curve_edges: Longs) -> Separated:
     taken = faces.copy()
     taken[rows] = new.reshape(-1, 3)
     _, index, times = np.unique(
-        keys_of(_ends_of(taken[rows])[is_open]), return_index=True, return_counts=True
+        keys_of(ends_of(taken[rows])[is_open]), return_index=True, return_counts=True
     )
-    shut = keys_of(_ends_of(near)[is_open])[index[times > 1]]
+    shut = keys_of(ends_of(near)[is_open])[index[times > 1]]
     return Separated(taken, copied, edges_of(np.unique(shut)))
 
 
@@ -119,7 +120,7 @@ def halved(faces: Longs, face_of: Longs, edges: Longs, first: int) -> tuple[Long
     keys = keys_of(edges)
     order = np.argsort(keys)
     while True:
-        own = keys_of(_ends_of(faces)).reshape(-1, 3)
+        own = keys_of(ends_of(faces)).reshape(-1, 3)
         place = order[np.searchsorted(keys, own, sorter=order).clip(max=len(keys) - 1)]
         is_due = keys[place] == own
         rows = np.flatnonzero(is_due.any(axis=1))

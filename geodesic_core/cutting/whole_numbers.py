@@ -7,6 +7,7 @@ import numpy as np
 
 from geodesic_core.arrays import Floats, Longs
 from geodesic_core.cutting.lines import Line
+from geodesic_core.cutting.separation import edges_of, ends_of, keys_of
 from geodesic_core.errors import InvalidMesh
 from geodesic_core.kernels.cutting.merging import merge_along
 from geodesic_core.kernels.cutting.predicates import NEAR, STEPS
@@ -82,10 +83,8 @@ def surroundings_of(mesh: TriangleMesh, lines: Sequence[Line]) -> Surroundings:
     faces = np.flatnonzero(is_own[mesh.faces].sum(axis=1) >= 2)
     faces = faces[of_three_vertices(mesh.faces[faces])]
     corners = mesh.faces[faces].astype(np.int64)
-    ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2))
-    keys, edges = np.unique(ends[:, 0] << 32 | ends[:, 1], return_inverse=True)
-    ends = np.stack([keys >> 32, keys & 0xFFFFFFFF], axis=1)
-    return Surroundings(faces, corners, edges.reshape(-1, 3), ends)
+    keys, edges = np.unique(keys_of(ends_of(corners)), return_inverse=True)
+    return Surroundings(faces, corners, edges.reshape(-1, 3), edges_of(keys))
 
 
 def _check_ends_apart(mesh: TriangleMesh, vertices: Longs) -> None:

@@ -9,24 +9,10 @@ import pytest
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
-from tests.support import zoo
 from tests.support.service import check_problem, serving, stored_mesh, upload_sample
 
 INSIDE = {"face": 40, "barycentric": [0.2, 0.3, 0.5]}
 PLACE = gc.SurfacePoint.face(40, (0.2, 0.3, 0.5))
-
-
-@pytest.fixture(scope="module")
-def terrain(client: TestClient) -> str:
-    return upload_sample(client, "terrain", 800)
-
-
-@pytest.fixture(scope="module")
-def book(client: TestClient) -> str:
-    """Three faces at one edge."""
-    case = zoo.IRREGULAR["book_of_3"]
-    mesh = {"vertices": case.vertices.tolist(), "faces": case.faces.tolist()}
-    return str(client.post("/v1/meshes", json=mesh).json()["id"])
 
 
 def ask(client: TestClient, mesh_id: str, link: str, **body: Any) -> Any:

@@ -24,6 +24,7 @@ from app.store.scratch import Scratch
 from app.store.store import Store
 from geodesic_core.fields.fast_sweep import FastSweep
 from geodesic_core.fields.sweeps import WholeSweep
+from tests.support import zoo
 from tests.support.against import ClusterClient, is_against_cluster, serving_cluster
 from tests.support.processes import workers_of
 from tests.support.waiting import LONG_S, wait_until
@@ -111,6 +112,19 @@ def one_replica(client: Any) -> Iterator[None]:
 def plane(client: TestClient) -> str:
     """The id of a small flat mesh."""
     return upload_sample(client, "plane", 200)
+
+
+@pytest.fixture(scope="module")
+def terrain(client: TestClient) -> str:
+    return upload_sample(client, "terrain", 800)
+
+
+@pytest.fixture(scope="module")
+def book(client: TestClient) -> str:
+    """Three faces at one edge."""
+    case = zoo.IRREGULAR["book_of_3"]
+    mesh = {"vertices": case.vertices.tolist(), "faces": case.faces.tolist()}
+    return str(client.post("/v1/meshes", json=mesh).json()["id"])
 
 
 @pytest.fixture(scope="session")
