@@ -58,7 +58,7 @@ class JobManager:
 
     async def keep_up(self) -> None:
         """Protect the answers of jobs that have finished elsewhere; nudge a runner that is new."""
-        self._retention.keep_up(await self._repository.ended())
+        await self._retention.keep_up(self._repository.ended)
         self.runner.nudge()
 
     async def submit(self, spec: JobSpec, query: bytes) -> Job:

@@ -4,7 +4,7 @@ Clocks may be moved by years, by a time server or a person. So the calendar says
 are when they are first seen; from then on a clock counts that nobody can set.
 """
 
-from collections.abc import Iterable
+from collections.abc import Awaitable, Callable, Iterable
 from datetime import UTC, datetime
 from time import monotonic
 from typing import NamedTuple
@@ -31,16 +31,20 @@ class Retention:
         self._ttl_s = ttl_s
         self._finished: dict[str, _FinishedJob] = {}
 
-    def keep_up(self, jobs: Iterable[EndedJob]) -> None:
-        """Note which jobs have finished and still are there."""
-        found = {job.id: job for job in jobs}
-        for job_id in self._finished.keys() - found.keys():
+    async def keep_up(self, read: Callable[[], Awaitable[Iterable[EndedJob]]]) -> None:
+        """Note which of the recorded jobs have finished and still are there, as ``read`` tells.
+
+        A job that finishes meanwhile may be missing there, and stays.
+        """
+        before = set(self._finished)
+        found = {job.id: job for job in await read()}
+        for job_id in before - found.keys():
             self.discard(job_id)
         for job in found.values():
             self.add(job)
 
     def add(self, job: EndedJob) -> None:
-        """Note a job that has finished.
+        """Note a job that has finished, and whose end is recorded.
 
         By the calendar its end may be to come: then its age is none.
         """

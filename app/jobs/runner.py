@@ -82,7 +82,7 @@ class JobRunner:
 
         Jobs that are under way at its end are run again inside the next one.
         """
-        self._retention.keep_up(await self._repository.ended())
+        await self._retention.keep_up(self._repository.ended)
         self.nudge()
         loops = [
             asyncio.create_task(repeat(self._look, 0.0, "jobs not looked for")),
@@ -129,7 +129,7 @@ class JobRunner:
                     self._live[job_id] = asyncio.create_task(self._run(*taken))
 
     async def _tidy(self) -> None:
-        self._retention.keep_up(await self._repository.ended())
+        await self._retention.keep_up(self._repository.ended)
         for job_id in self._retention.due():
             await self._repository.remove(job_id)
             self._retention.discard(job_id)
@@ -206,13 +206,15 @@ class JobRunner:
             return
         try:
             self._results.pin_within_quota(result.name, job.spec.client)
-            last = job.successful(result.name)
-            self._retention.add(EndedJob.of(last))  # which pins it as well
-            self._results.unpin(result.name, job.spec.client)
         except ProblemError as error:
-            last = job.failed(error.problem)
+            self._results.release(result)
+            await self._end(job, job.failed(error.problem))
+            return
         self._results.release(result)
-        await self._end(job, last)
+        try:
+            await self._end(job, job.successful(result.name))  # which pins it as well
+        finally:
+            self._results.unpin(result.name, job.spec.client)
 
     async def _end(self, job: Job, last: Job) -> None:
         self._ending.add(job.id)

@@ -1,6 +1,7 @@
 """Finished jobs stay for their time, whatever happens to the clock."""
 
 from collections import Counter
+from collections.abc import Awaitable, Callable
 from datetime import UTC, datetime, timedelta
 from typing import Any, cast
 
@@ -68,7 +69,30 @@ def test_a_clock_that_is_moved_changes_nothing(
     assert jobs.due() == [before.id, after.id]
 
 
-def test_what_finished_before_the_start(clock: Clock, calendar: Calendar) -> None:
+def records_of(*jobs: Job) -> Callable[[], Awaitable[list[EndedJob]]]:
+    async def read() -> list[EndedJob]:
+        return list(map(EndedJob.of, jobs))
+
+    return read
+
+
+@pytest.mark.anyio
+async def test_a_job_that_finishes_while_records_are_read_stays() -> None:
+    """They were read before, and do not have it."""
+    jobs = retention_of(pins := Pins())
+
+    async def read() -> list[EndedJob]:
+        jobs.add(EndedJob.of(finished_job()))
+        return []
+
+    await jobs.keep_up(read)
+    assert pins == {"a result": 1}
+    await jobs.keep_up(records_of())
+    assert pins == {"a result": 0}
+
+
+@pytest.mark.anyio
+async def test_what_finished_before_the_start(clock: Clock, calendar: Calendar) -> None:
     """By the calendar one job is as old as it can be, one is younger, and one is yet to end."""
     moved = (timedelta(hours=-1), timedelta(minutes=-50), TEN_YEARS)
     ended = []
@@ -78,14 +102,14 @@ def test_what_finished_before_the_start(clock: Clock, calendar: Calendar) -> Non
     calendar.moved = timedelta()
 
     jobs = retention_of(pins := Pins())
-    jobs.keep_up(map(EndedJob.of, ended))
-    jobs.keep_up(map(EndedJob.of, ended))
+    await jobs.keep_up(records_of(*ended))
+    await jobs.keep_up(records_of(*ended))
     assert pins == {"a result": 3}
 
     assert jobs.due() == [old.id]
     clock.now += 601
     assert jobs.due() == [old.id, younger.id]
-    jobs.keep_up([EndedJob.of(to_come)])
+    await jobs.keep_up(records_of(to_come))
     assert pins == {"a result": 1}
     clock.now += 2999
     assert jobs.due() == [to_come.id]
