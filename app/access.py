@@ -1,4 +1,7 @@
-"""Callers and their API keys: the name that limits, places in the queue and jobs are counted by."""
+"""Callers and their API keys: the name by which limits, places in the queue and jobs are counted.
+
+All keys of a service are those of one tenant, who shares meshes, names and jobs among them.
+"""
 
 import hashlib
 import hmac
@@ -19,15 +22,6 @@ class Caller:
 
     name: str
     has_key: bool
-
-    @property
-    def owner(self) -> str | None:
-        """The name under which the caller owns what it stores; None without keys."""
-        return self.name if self.has_key else None
-
-    def may_delete(self, owner: str | None) -> bool:
-        """Tell whether the caller may delete what ``owner`` stored."""
-        return not self.has_key or owner in (None, self.name)
 
 
 @lru_cache(maxsize=1024)

@@ -40,7 +40,6 @@ CODES: Mapping[str, Code] = {
         400, "Malformed request", "The bytes received are not a valid HTTP request."
     ),
     "unauthorized": Code(401, "Unauthorized", "The request has no API key, or a wrong one."),
-    "forbidden": Code(403, "Forbidden", "The API key does not allow this request."),
     "origin_not_allowed": Code(
         403, "Origin not allowed", "Pages of other sites may not make changes here; see `hint`."
     ),
@@ -79,6 +78,12 @@ CODES: Mapping[str, Code] = {
         422, "Invalid mesh", "The mesh cannot be used; `errors` names the faulty elements."
     ),
     "invalid_point": Code(422, "Invalid point", "A source or target is not a point of the mesh."),
+    "not_embedded": Code(
+        422,
+        "Not embedded",
+        "The mesh is given by the lengths of its edges, and the query needs positions in space: "
+        "upload it with vertices, or ask for angles in place of vectors.",
+    ),
     "limit_exceeded": Code(
         422,
         "Limit exceeded",
@@ -342,6 +347,7 @@ EXCEPTIONS: Sequence[tuple[type[BaseException], Callable[[Any], Problem]]] = (
     (core.MissingExtra, lambda error: Problem("unsupported_media_type", str(error))),
     (core.InvalidMesh, _invalid_mesh),
     (core.InvalidPoint, lambda error: Problem("invalid_point", str(error))),
+    (core.NotEmbedded, lambda error: Problem("not_embedded", str(error))),
     (core.InvalidArgument, lambda error: Problem("invalid_request", str(error))),
     (core.DeadlineExceeded, lambda error: Problem("deadline_exceeded", str(error))),
     (core.MemoryLimitExceeded, _over_memory),

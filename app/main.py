@@ -61,7 +61,7 @@ def create_app(settings: Settings) -> FastAPI:
     # The last one added is the outermost.
     app.add_middleware(HeadMiddleware)
     app.add_middleware(BodyTimeoutMiddleware, settings=settings)
-    app.add_middleware(AdmissionMiddleware, settings=settings, allowances=service.allowances)
+    app.add_middleware(AdmissionMiddleware, settings=settings)
     app.add_middleware(CrossSiteMiddleware, settings=settings)
     app.add_middleware(RequestIdMiddleware, settings=settings)
     if settings.cors_origins:

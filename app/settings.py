@@ -204,15 +204,14 @@ class Settings(BaseSettings):
     auth: Literal["on", "off"] = "on"
     """`off` serves without keys on any address, for instance behind a proxy that checks keys."""
     api_keys: Annotated[tuple[ApiKey, ...], NoDecode, BeforeValidator(_keys)] = ()
-    """Keys that clients must have, as `name:secret`, separated by commas; optional on loopback."""
+    """Keys of one tenant, one of which clients must have, as `name:secret`, separated by commas.
+
+    They share meshes, names and jobs. Keys are optional on loopback.
+    """
     rate_limit: PositiveInt | None = None
     """Requests per minute that a caller may make; all of them may come at once."""
     max_concurrent: PositiveInt | None = None
     """Requests of a caller that may run at the same time."""
-    quota_bytes: PositiveInt | None = None
-    """Size of the meshes that a caller was the first to store; without keys, of all callers."""
-    quota_jobs: PositiveInt | None = None
-    """Jobs of a caller, until they are removed; without keys, of all callers together."""
     quota_results_bytes: PositiveInt | None = Field(default_factory=_quota_results)
     """Size of the answers to a caller's jobs; by default half of all, and all without keys."""
     quota_uploads: PositiveInt | None = None

@@ -3,7 +3,7 @@
 import argparse
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from benchmarks import (
@@ -15,6 +15,7 @@ from benchmarks import (
     gate,
     large_matrix,
     load,
+    maps,
     matrix,
     page,
     path,
@@ -30,7 +31,7 @@ from benchmarks.scaling import measurement as scaling
 from benchmarks.soak import measurement as soak
 from benchmarks.tables import Section, write
 
-BENCHMARKS: dict[str, Callable[[Inputs, int], Section | Sequence[Section]]] = {
+BENCHMARKS: dict[str, Callable[[Inputs, int], Section | Iterable[Section]]] = {
     "topology": topology.run,
     "exact": exact.run,
     "approximate": approximate.run,
@@ -40,6 +41,7 @@ BENCHMARKS: dict[str, Callable[[Inputs, int], Section | Sequence[Section]]] = {
     "path": path.run,
     "path-peers": path.run_peers,
     "landmarks": path.run_landmarks,
+    "maps": maps.run,
     "matrix": matrix.run,
     "large-matrix": large_matrix.run,
     "sharing": sharing.run,

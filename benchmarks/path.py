@@ -18,8 +18,9 @@ from benchmarks.inputs import Inputs
 from benchmarks.tables import Section, rated
 from benchmarks.timing import timed
 from geodesic_core.arrays import Floats, Ints
-from geodesic_core.fields.path import SearchStep, length_of
+from geodesic_core.fields.path import SearchStep
 from geodesic_core.kernels.front.bounds import LANDMARKS
+from geodesic_core.mesh.surface_curve import length_of
 from geodesic_core.tolerances import LANDMARK_ERROR
 
 try:

@@ -16,12 +16,14 @@ Examples
 from geodesic_core import errors, samples
 from geodesic_core.compilation import compile_kernels, warm_up
 from geodesic_core.control import Control
+from geodesic_core.cutting.cut_mesh import CutMesh
 from geodesic_core.errors import GeodesicError
 from geodesic_core.fields.borders import Border
 from geodesic_core.fields.distance_field import DistanceField
-from geodesic_core.fields.isolines import Isoline, resolve_chord_error, spaced_levels
+from geodesic_core.fields.isolines import resolve_chord_error, spaced_levels
 from geodesic_core.fields.log_map import LogMap, Polar
 from geodesic_core.fields.path import ErrorBound, GeodesicPath, SearchStep
+from geodesic_core.fields.scalar_field import ScalarField
 from geodesic_core.fields.stored_field import load_field
 from geodesic_core.fields.straight_lines import StraightLine
 from geodesic_core.fields.sweep_result import Retain, SweepStats
@@ -33,6 +35,7 @@ from geodesic_core.matrices.matrix_parts import MatrixParts
 from geodesic_core.mesh.barriers import walled_in
 from geodesic_core.mesh.curve import share_a_face
 from geodesic_core.mesh.report import MeshReport, Sample
+from geodesic_core.mesh.surface_curve import SurfaceCurve
 from geodesic_core.mesh.surface_point import Curve, Source, SurfacePoint
 from geodesic_core.mesh.tangent_frames import TangentFrames
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -40,6 +43,7 @@ from geodesic_core.search.nearest import Nearest
 from geodesic_core.solvers import (
     Solver,
     approximate_distance,
+    cut,
     distance_matrix,
     error_bound,
     exact_distance,
@@ -57,11 +61,11 @@ __all__ = [
     "Border",
     "Control",
     "Curve",
+    "CutMesh",
     "DistanceField",
     "ErrorBound",
     "GeodesicError",
     "GeodesicPath",
-    "Isoline",
     "LogMap",
     "MatrixFile",
     "MatrixParts",
@@ -70,10 +74,12 @@ __all__ = [
     "Polar",
     "Retain",
     "Sample",
+    "ScalarField",
     "SearchStep",
     "Solver",
     "Source",
     "StraightLine",
+    "SurfaceCurve",
     "SurfacePoint",
     "SweepStats",
     "TangentFrames",
@@ -81,6 +87,7 @@ __all__ = [
     "approximate_distance",
     "as_mesh",
     "compile_kernels",
+    "cut",
     "distance_matrix",
     "error_bound",
     "errors",

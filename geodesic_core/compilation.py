@@ -24,6 +24,7 @@ from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.solvers import (
     Solver,
     approximate_distance,
+    cut,
     exact_distance,
     fast_distance,
     log_map,
@@ -99,6 +100,11 @@ def _maps() -> None:
     exact_distance(_mesh(), 0).transport(0.0)
 
 
+def _cuts() -> None:
+    mesh = _mesh()
+    cut(mesh, _curve(mesh))
+
+
 WORKLOADS: dict[str, Callable[[], None]] = {
     "exact": _exact,
     "approximate": _approximate,
@@ -110,6 +116,7 @@ WORKLOADS: dict[str, Callable[[], None]] = {
     "fast-curves": _fast_curves,
     "paths": _paths,
     "maps": _maps,
+    "cuts": _cuts,
 }
 """Calls that together use all kernels, in an order that suits two processes.
 
@@ -127,8 +134,8 @@ def compile_kernels(
     ----------
     workloads
         Kinds of calls to compile for: ``"exact"``, ``"approximate"``, ``"paths"``, ``"curves"``,
-        ``"approximate-curves"``, ``"fast"``, ``"fast-curves"``, ``"isolines"``, ``"borders"`` and
-        ``"maps"``; None for all.
+        ``"approximate-curves"``, ``"fast"``, ``"fast-curves"``, ``"isolines"``, ``"borders"``,
+        ``"maps"`` and ``"cuts"``; None for all.
     cancel
         Called before compilation begins and then ten times a second; compilation ends once it
         returns True. Not called where no kernel is missing.
@@ -144,7 +151,7 @@ def compile_kernels(
 
     Notes
     -----
-    All kernels take about 80 s of processor time, in as many processes as there are cores. The
+    All kernels take about 90 s of processor time, in as many processes as there are cores. The
     number of compiled kernels is written to standard error, unless ``GEODESIC_QUIET`` is set. Where
     the cache cannot be written, nothing is compiled ahead.
 

@@ -9,7 +9,10 @@ They form a tree::
     │   ├── TooManyVertices     more than the caller allows
     │   └── FileTooLarge        more bytes than the caller allows
     ├── InvalidPoint            a source or target that is not on the mesh
+    │   └── NoTangentPlane      a point of the mesh where directions have no meaning
     ├── InvalidArgument         any other argument out of its domain
+    │   ├── NoDirection         a vector that has no direction on the surface
+    │   └── NotEmbedded         what needs space, asked of a mesh given by the lengths of its edges
     ├── NoPath                  not connected, or farther than a limit (``reason``)
     ├── Cancelled               the caller asked the sweep to stop
     ├── DeadlineExceeded        the time the caller granted is over
@@ -190,6 +193,69 @@ class InvalidArgument(GeodesicError):  # noqa: N818
     Traceback (most recent call last):
         ...
     geodesic_core.errors.InvalidArgument: max_distance is -1.0; it must be a number, 0 or more
+    """
+
+
+class NoTangentPlane(InvalidPoint):
+    """A point where directions have no meaning: several fans of faces meet, or more than two faces.
+
+    Parameters
+    ----------
+    message
+        The sentence for its reader.
+    index
+        Its number, where lines start at several points.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(np.vstack([np.eye(3), -np.eye(3)]), [[0, 1, 2], [0, 4, 5]])
+    >>> try:
+    ...     gc.trace(mesh, [1, 0], 0.0, 1.0)
+    ... except gc.errors.NoTangentPlane as error:
+    ...     print(error.index)
+    1
+    """
+
+    def __init__(self, message: str, index: int = 0) -> None:
+        super().__init__(message)
+        self.index = index
+
+
+class NoDirection(InvalidArgument):
+    """A vector that has no direction on the surface: it is zero, or along the normal.
+
+    Parameters
+    ----------
+    message
+        The sentence for its reader.
+    index
+        Its number, where several are given.
+
+    Examples
+    --------
+    >>> try:
+    ...     gc.trace(gc.samples.plane(2), 0, [0.0, 0.0, 1.0], 1.0)
+    ... except gc.errors.NoDirection as error:
+    ...     print(error.index)
+    0
+    """
+
+    def __init__(self, message: str, index: int = 0) -> None:
+        super().__init__(message)
+        self.index = index
+
+
+class NotEmbedded(InvalidArgument):
+    """What needs space, asked of a mesh that is given by the lengths of its edges.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh.from_lengths([[0, 1, 2]], [[1.0, 1.0, 1.0]])
+    >>> try:
+    ...     mesh.locate([0.0, 0.0, 0.0])
+    ... except gc.errors.NotEmbedded as error:
+    ...     print(error)
+    locate needs positions in space, and this mesh has lengths alone: give it vertices as well
     """
 
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import pyvista
 
-from geodesic_core.mesh.surface_point import Point, Points, Sources
+from geodesic_core.mesh.surface_curve import Sources
+from geodesic_core.mesh.surface_point import Point, Points
 from geodesic_core.plotting import with_distances
 from geodesic_core.solvers import exact_distance, shortest_path
 

@@ -14,11 +14,14 @@ import numpy as np
 
 from geodesic_core.arrays import Floats
 from geodesic_core.control import Control
-from geodesic_core.errors import NoPath
+from geodesic_core.cutting.cut import cut_along
+from geodesic_core.cutting.cut_mesh import CutMesh
+from geodesic_core.cutting.lines import as_line
+from geodesic_core.errors import InvalidArgument, NoPath
 from geodesic_core.fields.distance_field import DistanceField, solve
 from geodesic_core.fields.log_map import LogMap, log_map_of
 from geodesic_core.fields.methods import Effort, Method, promise_of, sweep_of
-from geodesic_core.fields.path import ErrorBound, GeodesicPath, joined, length_of
+from geodesic_core.fields.path import ErrorBound, GeodesicPath, joined
 from geodesic_core.fields.question import Question
 from geodesic_core.fields.sources import component_of, disconnected, each_of
 from geodesic_core.fields.straight_lines import (
@@ -33,7 +36,8 @@ from geodesic_core.io.as_mesh import MeshLike, as_mesh
 from geodesic_core.kernels.jit.cache import sources_digest
 from geodesic_core.matrices.matrix import Layout, find_matrix
 from geodesic_core.mesh.barriers import with_barriers
-from geodesic_core.mesh.surface_point import Point, Points, Sources, SurfacePoint
+from geodesic_core.mesh.surface_curve import Sources, SurfaceCurve, length_of
+from geodesic_core.mesh.surface_point import Curve, Point, Points, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.nearest import Nearest, find_nearest
 from geodesic_core.search.path_search import PathSearch
@@ -594,18 +598,23 @@ def log_map(
 
     Raises
     ------
+    NoTangentPlane
+        Several fans of faces meet at the source, or three faces or more at its edge.
     InvalidPoint
-        The source is not on the mesh, or has no tangent plane: several fans of faces meet there, or
-        three faces or more at its edge. Or no path leads to the point at which the x axis looks.
+        The source is not on the mesh, or no path leads to the point at which the x axis looks.
+    NoDirection
+        The x axis is zero, or along the normal.
+    NotEmbedded
+        The x axis is a vector, and the mesh is given by its lengths.
     InvalidArgument
-        The x axis has no direction, or another argument is out of its domain.
+        Another argument is out of its domain.
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As in `exact_distance`.
 
     Notes
     -----
-    Windows carry the direction through the sweep, which takes a tenth more time than that of
-    `exact_distance`.
+    Windows carry the direction through the sweep. On scans it takes a tenth more time than that of
+    `exact_distance`; where the source sees most vertices straight, a quarter.
     Behind the first bend of a path all vertices have its direction: see `LogMap`.
 
     Examples
@@ -671,11 +680,16 @@ def trace(
 
     Raises
     ------
+    NoTangentPlane
+        A start has none, as in `log_map`.
     InvalidPoint
-        A start is not on the mesh, or has no tangent plane, as in `log_map`.
+        A start is not on the mesh.
+    NoDirection
+        A vector is zero, or along the normal.
+    NotEmbedded
+        A direction is a vector, and the mesh is given by its lengths.
     InvalidArgument
-        A vector has no direction on the surface, numbers of starts, directions and lengths differ,
-        or another argument is out of its domain.
+        Numbers of starts, directions and lengths differ, or another argument is out of its domain.
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As in `exact_distance`.
 
@@ -702,6 +716,81 @@ def trace(
     lengths = as_lengths(length, len(starts))
     lines = lines_from(surface, starts, angles, lengths, at_vertices == "stop", control)
     return lines if isinstance(start, Iterable) else lines[0]
+
+
+def cut(
+    mesh: MeshLike | Solver,
+    curves: Curve | SurfaceCurve | Sequence[Curve | SurfaceCurve],
+    separate: bool = True,
+    *,
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> CutMesh:
+    """Return the mesh cut along curves, which then are edges of it.
+
+    Curves may cross, touch and overlap, end anywhere, pass through vertices and run along edges. A
+    curve of one point makes that a vertex. Faces that no curve meets stay as they are; each other
+    one is triangulated anew, exactly: no face turns over, no vertex lies on an edge of another
+    face, and distances on the surface stay the same.
+
+    Parameters
+    ----------
+    mesh
+        The surface: a `TriangleMesh`, anything else that `as_mesh` takes, or a `Solver`. Its
+        barriers stay blocked.
+    curves
+        One or more: a `SurfaceCurve` on this mesh, as paths, isolines, borders and boundaries are,
+        or a `Curve`.
+    separate
+        Whether the surface comes apart along the curves: each of their vertices is doubled, once
+        for each fan of faces between them. An edge neither of whose ends would be doubled, as of a
+        curve of one edge, gets one more vertex in its middle.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
+
+    Returns
+    -------
+    CutMesh
+        The new mesh, and where its vertices and faces were on the old one.
+
+    Raises
+    ------
+    InvalidArgument
+        There is no curve, or one is not a curve of this mesh.
+    InvalidPoint
+        A point of a curve is not on the mesh, or shares no face with the next.
+    InvalidMesh
+        A curve meets a vertex that an edge of zero length joins to another one.
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        The call was stopped; the mesh can still be used.
+
+    Notes
+    -----
+    O(V + F), and O(n log n) in practice for n new vertices; k curves that all cross in one face
+    have k² / 2 crossings there. Points are told apart in steps of 2**-40 of an edge, and what is
+    nearer than 2**-30, about 1e-9, is one: a curve that passes a vertex, an edge or another curve
+    within this share of an edge runs through it, and moves by as much. Otherwise two curves that
+    are close stay two, with thin faces between them. On a surface that is given by lengths, those
+    of new edges are found in the faces laid out flat.
+
+    Examples
+    --------
+    >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
+    >>> cut = gc.cut(mesh, gc.shortest_path(mesh, 1, 2))
+    >>> cut.parts.tolist()
+    [0, 1, 1, 0]
+    >>> gc.exact_distance(cut.mesh, 0).distances.round(3).tolist()
+    [0.0, inf, 1.0, inf, inf, 0.707, 1.0, inf]
+    """
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    surface = mesh.mesh if isinstance(mesh, Solver) else as_mesh(mesh)
+    given = [curves] if isinstance(curves, Curve | SurfaceCurve) else list(curves)
+    if not given:
+        raise InvalidArgument("there are no curves: give at least one")
+    lines = [as_line(surface, curve, f"curve {i}", control) for i, curve in enumerate(given)]
+    return cut_along(surface, lines, control, separate=separate)
 
 
 class Solver:
@@ -755,6 +844,7 @@ class Solver:
     nearest = nearest
     log_map = log_map
     trace = trace
+    cut = cut
 
 
 def _surface_of(

@@ -239,6 +239,14 @@ One spelling of a point differs from another by rounding: by 1e-16 of the edge a
 1e-16 of the mesh as a position. A step is 1e-12 of an edge.
 """
 
+MERGE = 2.0**-30
+"""Share of an edge, or of a barycentric weight, within which points of a cut are one.
+
+A curve that passes a vertex, an edge, a point of another curve or their crossing within this much
+runs through it, so that no face of the cut mesh is thinner than the rounding of its corners. It
+moves by 1e-9 of an edge.
+"""
+
 SNAP = 1e-12
 """Share of the bounding box's diagonal within which a position counts as on a vertex or an edge."""
 
@@ -246,6 +254,12 @@ ROUNDED_COORDINATE = 2.0**-50
 """Share of the largest coordinate within which it counts as such as well: a few roundings.
 
 The positions of a georeferenced mesh round by more than `SNAP`: at 5e6 from the origin, by 1e-9.
+"""
+
+SAME_HEIGHT = 1e-9
+"""Share of its extent up to which two heights of a surface above one place are one: rounding.
+
+Faces that meet at the place are both found there.
 """
 
 NEARLY_JOINED = 1e-3

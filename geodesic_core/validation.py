@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from geodesic_core.arrays import Floats, Longs
-from geodesic_core.errors import InvalidArgument
+from geodesic_core.errors import InvalidArgument, InvalidPoint
+from geodesic_core.tolerances import LARGEST_COORDINATE
 
 
 def is_number(value: Any) -> bool:
@@ -43,6 +44,35 @@ def as_vector(name: str, value: Any) -> Floats:
     if vector.shape != (3,) or not np.isfinite(vector).all():
         raise InvalidArgument(f"{name} is {value!r}; it must be a vector of three finite numbers")
     return vector
+
+
+def as_places(name: str, places: Any, dimensions: int) -> tuple[list[tuple[str, Floats]], bool]:
+    """Return places in space or in the plane, each with its name, and whether one was given.
+
+    Raises
+    ------
+    InvalidPoint
+        One is not so many finite numbers in the range that vertices may have.
+    """
+    try:
+        given = np.asarray(places, np.float64)
+    except (TypeError, ValueError):
+        given = np.empty(0)
+    numbers = {2: "two", 3: "three"}[dimensions]
+    if given.ndim not in (1, 2) or given.shape[-1] != dimensions:
+        raise InvalidPoint(
+            f"the {name} is {places!r}; it must be {numbers} finite numbers, or an array of such "
+            f"rows"
+        )
+    is_one = given.ndim == 1
+    rows = [(name if is_one else f"{name} {i}", row) for i, row in enumerate(np.atleast_2d(given))]
+    for called, row in rows:
+        if not (np.abs(row) <= LARGEST_COORDINATE).all():
+            raise InvalidPoint(
+                f"the {called} is {row.tolist()}; it must be {numbers} finite numbers, at most "
+                f"{LARGEST_COORDINATE:g} in size"
+            )
+    return rows, is_one
 
 
 def as_angle(angle: float) -> float:

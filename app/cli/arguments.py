@@ -86,7 +86,8 @@ MeshFile = Annotated[
     Path,
     typer.Argument(
         metavar="MESH",
-        help="An OBJ, OFF, PLY, STL, GLB, GIFTI, FreeSurfer or VTK file; - for standard input.",
+        help="An OBJ, OFF, PLY, STL, GLB, GIFTI, FreeSurfer, VTK or NPZ file; - for standard "
+        "input.",
     ),
 ]
 FormatOption = Annotated[
@@ -143,6 +144,7 @@ PointOrLabelSources = Annotated[
         "repeated.",
     ),
 ]
+SomePointOrLabelSources = Annotated[list[PointOrLabel] | None, *get_args(PointOrLabelSources)[1:]]
 PointOrCurveSource = Annotated[
     PointOrCurve,
     typer.Option(

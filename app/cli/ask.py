@@ -5,7 +5,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from app.cli.barriers import BlockedFaces
-from app.cli.points import Point, PointOrCurve, PointOrLabel, Position
+from app.cli.points import Direction, Point, PointOrCurve, PointOrLabel, Position
 from app.cli.steps import Failure, MeshInput, read, showing
 from app.cli.words import say_warning, words_of
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from app.errors import Problem
     from geodesic_core import TriangleMesh
 
-Written = Point | PointOrCurve | Position
+Written = Point | PointOrCurve | Position | Direction
 WrittenMembers = Mapping[str, Written | Sequence[Written] | Sequence[PointOrLabel]]
 """Points by the member of the request that they become."""
 
@@ -27,6 +27,9 @@ _OPTIONS = {
     "candidates": "--candidate",
     "points": "--at",
     "levels": "--level",
+    "starts": "--from",
+    "directions": "--direction",
+    "lengths": "--length",
 }
 """Options whose names differ from their members."""
 
@@ -130,7 +133,7 @@ def _message(problem: "Problem", points: Mapping[str, Written | Sequence[Written
     fault = problem.errors[0]
     name, *parts = fault.pointer.removeprefix("/").split("/")
     option = _option_of(name)
-    if name in points:
+    if name in points and (parts or isinstance(points[name], Written)):  # not the whole list
         option += f" {_text_at(points[name], parts)}"
     return f"{option}: {fault.message}"
 

@@ -83,6 +83,8 @@ def _in_words(value: Any) -> str:
             return f"{count} ({shown}{', …' if count > len(ids) else ''})"
         case bool():
             return "yes" if value else "no"
+        case None:
+            return "none"
         case ((*low,), (*high,)):
             return " to ".join("(" + ", ".join(map(repr, end)) + ")" for end in (low, high))
         case _:

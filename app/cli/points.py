@@ -91,6 +91,36 @@ class Position:
         return self.coordinates
 
 
+@dataclass(frozen=True)
+class Direction:
+    """A direction at a point, as it was written: an angle, a vector, or a point to look at."""
+
+    text: str
+    direction: Any
+
+    @classmethod
+    def parse(cls, text: str) -> "Direction":
+        """Return the direction that an option names as an angle, or as a vector."""
+        try:
+            return cls(text, Position.parse(text).coordinates if "," in text else float(text))
+        except (ValueError, typer.BadParameter):
+            raise typer.BadParameter(
+                f"{text!r} is neither an angle in radians nor a vector, written as x,y,z"
+            ) from None
+
+    @classmethod
+    def to_look_at(cls, text: str) -> "Direction":
+        """Return the direction that an option names as a vector, or as a point to look at."""
+        try:
+            return cls(text, Position.parse(text).coordinates)
+        except typer.BadParameter:
+            return cls(text, Point.parse(text).as_json())
+
+    def as_json(self) -> Any:
+        """Return the direction as a member of a request."""
+        return self.direction
+
+
 def _refuse_label(text: str) -> None:
     if Label.parse(text) is not None:
         raise typer.BadParameter(

@@ -9,12 +9,13 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from inspect import Parameter
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from app.cli.arguments import (
     NO_MERGE,
+    SPELLINGS,
     AbsoluteError,
     Barriers,
     BoundedMethodOption,
@@ -28,6 +29,7 @@ from app.cli.arguments import (
     PointOrCurveSources,
     PointOrLabelSources,
     RelativeError,
+    SomePointOrLabelSources,
     Source,
     Targets,
     accuracy,
@@ -35,10 +37,12 @@ from app.cli.arguments import (
     writable,
 )
 from app.cli.ask import Answered, ask
+from app.cli.barriers import BlockedFaces
 from app.cli.output import AsJson, Output
-from app.cli.points import Point, Position
+from app.cli.points import Direction, Point, Position
 from app.cli.steps import Failure, MeshInput
 from app.cli.summary import bound_in_words, print_bound, print_end, print_size
+from app.cli.values_file import Values
 
 if TYPE_CHECKING:
     from app.encoding import Answer
@@ -163,7 +167,7 @@ def _without_via(given: Given) -> dict[str, Any]:
 
 def _of_path(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
     yield f"length      {found['length']!r}"
-    yield f"points      {len(found['points'])}"
+    yield f"points      {len(found['locations'])}"
 
 
 def _of_steps(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
@@ -189,7 +193,15 @@ def _of_paths(given: Given, found: Mapping[str, Any]) -> Iterator[str]:
 def _levels(given: Given) -> dict[str, Any]:
     if (given["count"] is None) == (given["level"] is None):
         raise typer.BadParameter("give --count, or --level at least once, and not both")
-    return {"levels": given["level"], "count": given["count"]}
+    values = given["values"]
+    if (values is None) == (not given["source"]):
+        raise typer.BadParameter("give --source at least once, or --values, and not both")
+    levels = {"levels": given["level"], "count": given["count"]}
+    return levels if values is None else {**levels, "values": values.given}
+
+
+def _barriers(given: Given) -> dict[str, Any]:
+    return {"barriers": given["barriers"] or BlockedFaces()}
 
 
 def _of_isolines(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
@@ -208,6 +220,13 @@ def _of_borders(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
         first, second = line["sources"]
         kind = "closed" if line["closed"] else "open"
         yield f"border      of sources {first} and {second}: {kind}, {float(line['length'])!r} long"
+
+
+def _of_boundaries(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
+    for line in found["boundaries"]:
+        kind = "closed" if line["closed"] else "open"
+        count = len(line["vertices"])
+        yield f"boundary    {kind}, {count} vertices, {float(line['length'])!r} long"
 
 
 # Points
@@ -234,6 +253,36 @@ def _of_locate(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
         yield f"point       f{point['face']}:{','.join(map(repr, point['barycentric']))}"
     yield f"position    {','.join(map(repr, point['position']))}"
     yield f"distance    {point['distance']!r}"
+
+
+# Log map and straight lines
+
+
+def _x_axis(given: Given) -> dict[str, Any]:
+    axis = given["x_axis"]
+    return {"x_axis": None if axis is None else axis.as_json(), "rescale": not given["true_angles"]}
+
+
+def _of_log_map(given: Given, found: Mapping[str, Any]) -> Iterator[str]:
+    yield from _of_distance(given, found)
+    bends = found["bends"].array
+    yield f"bent        {(bends > 0).sum()} of {(bends >= 0).sum()} paths"
+    yield f"total angle {found['total_angle']!r}"
+
+
+def _lines(given: Given) -> dict[str, Any]:
+    return {
+        "lengths": given["length"],
+        "at_vertices": given["at_vertices"],
+        **_barriers(given),
+    }
+
+
+def _of_trace(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
+    for line in found["lines"].tolist():
+        end = line["locations"][-1]
+        place = f"f{end['face']}:{','.join(map(repr, end['barycentric']))}"
+        yield f"line        {line['length']!r} long, to {place}, stopped by {line['stopped']}"
 
 
 COMMANDS = {
@@ -307,15 +356,29 @@ COMMANDS = {
     ),
     "isolines": Command(
         "isolines",
-        "Draw lines of equal distance from the nearest source.",
+        "Draw lines of equal distance from the nearest source, or of equal values.",
         "Drawing isolines",
         {
-            "source": (PointOrLabelSources, _NEEDED),
+            "source": (SomePointOrLabelSources, None),
+            "values": (
+                Annotated[
+                    Values | None,
+                    typer.Option(
+                        parser=Values.read,
+                        metavar="FILE",
+                        help="In place of --source: a value for each vertex. A .npy file, or text "
+                        "with a number a line, or with a column named value.",
+                    ),
+                ],
+                None,
+            ),
             **_LINES_OUT,
             "level": (
                 Annotated[
                     list[float] | None,
-                    typer.Option(help="A distance at which to draw lines; may be repeated."),
+                    typer.Option(
+                        help="A distance, or a value, at which to draw lines; may be repeated."
+                    ),
                 ],
                 None,
             ),
@@ -345,6 +408,15 @@ COMMANDS = {
         {"sources": "source"},
         _of_borders,
     ),
+    "boundaries": Command(
+        "boundaries",
+        "Find the boundary of the surface, as lines along its edges.",
+        "Following the boundary",
+        {**_LINES_OUT, "barriers": (Barriers, None)},
+        {},
+        _of_boundaries,
+        _barriers,
+    ),
     "nearest": Command(
         "nearest",
         "Find the candidates that are nearest to a point along the surface.",
@@ -359,6 +431,97 @@ COMMANDS = {
         {"source": "source", "candidates": "candidate"},
         _of_nearest,
         _k,
+    ),
+    "log-map": Command(
+        "log_map",
+        "Compute how far every vertex is from a point, and in which direction.",
+        "Computing the log map",
+        {
+            "source": (Source, _NEEDED),
+            **_out(
+                "map goes: .npy (distance, angle, two coordinates, bends), .csv, .json or .ply "
+                "(the mesh, coloured); - prints .csv.",
+                *(".npy", ".csv", ".json", ".ply"),
+            ),
+            "x_axis": (
+                Annotated[
+                    Direction | None,
+                    typer.Option(
+                        parser=Direction.to_look_at,
+                        metavar="POINT|X,Y,Z",
+                        help="From where angles are measured: a point to look at, or a vector in "
+                        "space.",
+                    ),
+                ],
+                None,
+            ),
+            "true_angles": (
+                Annotated[
+                    bool,
+                    typer.Option(
+                        "--true-angles",
+                        help="Do not rescale the angles around the source to a full turn.",
+                    ),
+                ],
+                False,
+            ),
+            **_REACH,
+        },
+        {"source": "source"},
+        _of_log_map,
+        _x_axis,
+    ),
+    "trace": Command(
+        "trace",
+        "Go straight on over the surface, from points in directions.",
+        "Tracing lines",
+        {
+            "start": (
+                Annotated[
+                    list[Point],
+                    typer.Option(
+                        "--from",
+                        parser=Point.parse,
+                        metavar="POINT",
+                        help=f"Where a line starts, {SPELLINGS}; may be repeated, as the next two: "
+                        "give one for all lines, or one for each.",
+                    ),
+                ],
+                _NEEDED,
+            ),
+            "direction": (
+                Annotated[
+                    list[Direction],
+                    typer.Option(
+                        parser=Direction.parse,
+                        metavar="ANGLE|X,Y,Z",
+                        help="Its direction: radians, from where the angles of log-map begin, or a "
+                        "vector in space.",
+                    ),
+                ],
+                _NEEDED,
+            ),
+            "length": (Annotated[list[float], typer.Option(help="Its length.")], _NEEDED),
+            **_out(
+                "lines go: .obj (polylines), .csv, .json, or .npy (the numbers of .csv); - prints "
+                ".csv.",
+                *(*_LINES, ".npy"),
+            ),
+            "at_vertices": (
+                Annotated[
+                    Literal["straight", "stop"],
+                    typer.Option(
+                        "--at-vertices",
+                        help="'straight': on, with equal angles on both sides; 'stop': no farther.",
+                    ),
+                ],
+                "straight",
+            ),
+            "barriers": (Barriers, None),
+        },
+        {"starts": "start", "directions": "direction"},
+        _of_trace,
+        _lines,
     ),
     "locate": Command(
         "locate",
@@ -409,7 +572,7 @@ def _run(command: Command, given: dict[str, Any]) -> None:
         members |= accuracy(**{name: given[name] for name in names})
     if "chord_error" in given:
         members["chord_error"] = given["chord_error"]
-    if "barriers" in given:
+    if "max_distance" in given:
         members |= limits(given["max_distance"], given["barriers"])
     points = {member: given[option] or [] for member, option in command.points.items()}
     if command.kind == "locate":

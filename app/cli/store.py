@@ -68,11 +68,11 @@ def ls(root: Root = _DEFAULT, state: State = None, as_json: AsJson = False) -> N
         print_json(_document(found))
         return
     if found.meshes:
-        typer.echo(_ROW.format("id", "faces", "bytes", "created", "last used", "owner", "name"))
+        typer.echo(_ROW.format("id", "faces", "bytes", "created", "last used", "name"))
     for mesh in found.meshes:
         faces = "damaged" if mesh.faces is None else mesh.faces
         used = mesh.last_used.isoformat(timespec="seconds")
-        row = mesh.id, faces, mesh.bytes, mesh.created, used, mesh.owner, mesh.name
+        row = mesh.id, faces, mesh.bytes, mesh.created, used, mesh.name
         cells = ("" if cell is None else cell for cell in row)
         typer.echo(_ROW.format(*cells).rstrip())
     total = sum(mesh.bytes for mesh in found.meshes)
@@ -129,18 +129,17 @@ def prune(
                     remove(leftover)
     if as_json:
         removed = [
-            {"reason": leftover.reason, "paths": list(map(str, leftover.paths)), "bytes": size}
-            for leftover, size in going
+            {"paths": list(map(str, leftover.paths)), "bytes": size} for leftover, size in going
         ]
         print_json({"dry_run": dry_run, "removed": removed})
         return
     for leftover, size in going:
-        typer.echo(f"{leftover.reason}: {leftover.paths[0].relative_to(root)}, {size} bytes")
+        typer.echo(f"{leftover.paths[0].relative_to(root)}, {size} bytes")
     verb = "to remove" if dry_run else "removed"
     typer.echo(f"{verb:12}{len(going)}, {sum(size for _, size in going)} bytes")
 
 
-_ROW = "{:32}  {:>9}  {:>13}  {:25}  {:25}  {:8}  {}"
+_ROW = "{:32}  {:>9}  {:>13}  {:25}  {:25}  {}"
 
 
 @contextmanager
@@ -168,7 +167,7 @@ def _document(found: "Contents") -> dict[str, Any]:
                 "id": job.id,
                 "status": job.status,
                 "mesh_id": job.spec.mesh_id,
-                "owner": job.spec.owner,
+                "client": job.spec.client,
                 "created": job.created,
             }
             for job in found.jobs

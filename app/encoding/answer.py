@@ -4,6 +4,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from app.encoding.views import Line, Surface, Table
 
 Buffer = bytes | memoryview
@@ -28,6 +31,8 @@ class Answer:
     table, lines, surface
         The views, or functions that make them; None for a view that it lacks. There is at least one
         line.
+    array
+        Makes the body in binary formats where it is not the first of the ``arrays`` itself.
     """
 
     members: Mapping[str, Any]
@@ -37,6 +42,7 @@ class Answer:
     table: Table | None = None
     lines: Callable[[], Sequence[Line]] | None = None
     surface: Surface | None = None
+    array: Callable[[], NDArray[np.float64]] | None = None
 
 
 Encoded = tuple[Iterable[Buffer], Mapping[str, str]]

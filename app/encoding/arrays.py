@@ -52,7 +52,8 @@ def to_npz(answer: Answer, dtype: str) -> Encoded:
 
 
 def _body(answer: Answer, dtype: str) -> NDArray[Any]:
-    array: NDArray[Any] | None = answer.members[answer.arrays[0]]
+    array: NDArray[Any] | None
+    array = answer.members[answer.arrays[0]] if answer.array is None else answer.array()
     if array is None:  # no path: the headers state the reason
         array = np.empty((0, 3))
     try:

@@ -4,7 +4,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from cmap import Colormap
 from numpy.typing import NDArray
 
 _GREY = 128, 128, 128
@@ -27,4 +26,6 @@ def colours_of(values: NDArray[np.floating[Any]], largest: float) -> NDArray[np.
 
 @cache
 def _table() -> NDArray[np.uint8]:
+    from cmap import Colormap
+
     return np.rint(255.0 * Colormap("viridis").lut(_STEPS)[:, :3]).astype(np.uint8)

@@ -4,13 +4,16 @@ from collections.abc import Iterator, Sequence
 
 from app.encoding.answer import Answer, Buffer, Encoded
 from app.encoding.headers import headers_of
-from app.encoding.views import Line
+from app.encoding.views import Line, embedded
 
 
 def to_obj(answer: Answer) -> Encoded:
     """Encode the lines as ``l`` elements, single points as ``p``."""
     assert answer.lines is not None, "an answer in OBJ has lines"  # noqa: S101
-    return _written(answer.lines()), headers_of(answer, answer.shown)
+    lines = answer.lines()
+    for line in lines:
+        embedded(line.points)
+    return _written(lines), headers_of(answer, answer.shown)
 
 
 def _written(lines: Sequence[Line]) -> Iterator[Buffer]:

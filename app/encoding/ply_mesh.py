@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from app.encoding.answer import Answer, Buffer, Encoded
 from app.encoding.colours import colours_of, largest_of
 from app.encoding.headers import headers_of
-from app.encoding.views import Indices, Surface
+from app.encoding.views import Indices, Surface, embedded
 
 _ROWS = 2**11
 """Rows that are written at a time: few enough for malloc to reuse their memory."""
@@ -20,6 +20,7 @@ _RGB = "red", "green", "blue"
 def to_ply(answer: Answer) -> Encoded:
     """Encode the surface."""
     assert answer.surface is not None, "an answer in PLY has a surface"  # noqa: S101
+    embedded(answer.surface.vertices)
     return ply_of(answer.surface), headers_of(answer, answer.shown)
 
 

@@ -8,6 +8,8 @@ import numpy as np
 import orjson
 from numpy.typing import NDArray
 
+from geodesic_core.errors import NotEmbedded
+
 _ROWS = 2**11
 """Rows of arrays that are turned into cells at a time."""
 
@@ -72,7 +74,7 @@ class Line:
     """A polyline with its properties; without points where there is no line."""
 
     points: NDArray[np.float64]
-    """(K, 3), mesh units; empty where there is no line"""
+    """(K, 3), mesh units; empty where there is no line, NaN on a mesh without positions"""
     properties: Mapping[str, Any]
     """Values for CSV, under the same names in all lines of an answer"""
     group: str = ""
@@ -92,6 +94,16 @@ class Surface:
     values: Mapping[str, Values] = field(default_factory=dict)
 
 
+def embedded(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return positions, or refuse to draw without any."""
+    if np.isnan(points).any():
+        raise NotEmbedded(
+            "a drawing needs positions in space, and this mesh has lengths alone: ask for json or "
+            "csv"
+        )
+    return points
+
+
 def rows_of(*columns: Column) -> Iterator[Sequence[Any]]:
     """Yield the rows of columns of one length, turning a part of each into cells at a time."""
     for start in range(0, len(columns[0]), _ROWS):
@@ -109,7 +121,9 @@ def table_of_lines(lines: Sequence[Line]) -> Table:
             if not len(line.points):
                 yield properties + (None,) * (4 + len(first.at_points))
                 continue
-            columns = *line.points.T.tolist(), *line.at_points.values()
+            positions = line.points.T.astype(object)
+            positions[np.isnan(line.points.T)] = None
+            columns = *positions.tolist(), *line.at_points.values()
             points = zip(range(len(line.points)), *columns, strict=True)
             yield from (properties + point for point in points)
 

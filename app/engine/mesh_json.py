@@ -1,6 +1,10 @@
-"""Reader of meshes in JSON: ``{"vertices": [[x, y, z], …], "faces": [[i, j, k], …]}``."""
+"""Reader of meshes in JSON: ``{"vertices": [[x, y, z], …], "faces": [[i, j, k], …]}``.
 
-from typing import Any
+``"lengths": [[a, b, c], …]``, of the edges of each face, may stand in place of the vertices, or
+beside them.
+"""
+
+from typing import Any, NamedTuple
 
 import numpy as np
 import orjson
@@ -8,11 +12,25 @@ from numpy.typing import NDArray
 
 from app.errors import Fault, ProblemError, pointer, problem
 
-_MEMBERS = ("vertices", "faces")
+_ROWS = {
+    "vertices": ("iuf", "three finite numbers"),
+    "faces": ("iu", "three vertex indices"),
+    "lengths": ("iuf", "three finite numbers"),
+}
+"""The members: which kinds of numbers they have, and of what each of their rows consists"""
 
 
-def read_json_mesh(body: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return vertices and faces; `TriangleMesh` checks whether they make a mesh."""
+class JsonMesh(NamedTuple):
+    """The arrays of a mesh in JSON, (N, 3) each."""
+
+    faces: NDArray[np.int64]
+    vertices: NDArray[np.float64] | None
+    lengths: NDArray[np.float64] | None
+    """None where they are the distances of the vertices, which are there then"""
+
+
+def read_json_mesh(body: bytes) -> JsonMesh:
+    """Return the arrays of a mesh; `TriangleMesh` checks whether they make one."""
     try:
         document = orjson.loads(body)
     except orjson.JSONDecodeError as error:
@@ -20,17 +38,20 @@ def read_json_mesh(body: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]
     if not isinstance(document, dict):
         raise _invalid("", "an object with vertices and faces is expected")
     for name in document:
-        if name not in _MEMBERS:
+        if name not in _ROWS:
             raise _invalid(pointer(name), f"unknown field {name!r}")
-    for name in _MEMBERS:
+    for name in ("faces", *([] if "lengths" in document else ["vertices"])):
         if name not in document:
             raise _invalid(pointer(name), f"{name} is missing")
     if b"true" in body or b"false" in body:  # which NumPy takes for 1 and 0
-        for name in _MEMBERS:
+        for name in document:
             _refuse_booleans(name, document[name])
-    vertices = _rows(document, "vertices", "iuf", "three finite numbers")
-    faces = _rows(document, "faces", "iu", "three vertex indices")
-    return vertices.astype(np.float64), faces.astype(np.int64)
+    found = {name: _rows(document, name, *_ROWS[name]) for name in _ROWS if name in document}
+    vertices, lengths = (
+        found[name].astype(np.float64) if name in found else None
+        for name in ("vertices", "lengths")
+    )
+    return JsonMesh(found["faces"].astype(np.int64), vertices, lengths)
 
 
 def _refuse_booleans(name: str, rows: Any) -> None:

@@ -11,6 +11,7 @@ from contextlib import suppress
 from importlib import import_module
 
 LATE = (
+    "cmap",
     "filelock",
     "igl",
     "manifold3d",

@@ -41,8 +41,6 @@ class StoreMesh:
 
     mesh_input: MeshInput
     folder: Path
-    owner: str | None = None
-    """Name of the API key that may delete the mesh; None for everybody"""
     name: str | None = None
     """What people call the mesh"""
 

@@ -39,7 +39,7 @@ from app.queries import (
     Unwritten,
     code_version,
 )
-from app.queries.validation import check_json_size
+from app.queries.validation import check_json_size, invalid_fields, naming
 from app.settings import Settings
 from app.store.fields import FieldStore
 from app.store.lru_cache import LRUCache
@@ -139,7 +139,7 @@ class Worker:
             _stop_if(cancel)
             with clock.phase("store"):
                 check = partial(_stop_if, cancel)
-                written = self.store.write_aside(mesh, work.folder, work.owner, work.name, check)
+                written = self.store.write_aside(mesh, work.folder, work.name, check)
         except FileNotFoundError:
             if cancel():  # then the upload and the scratch folder are removed
                 raise gc.errors.Cancelled from None
@@ -314,8 +314,19 @@ class Clock:
 def _make_mesh(
     mesh_input: MeshInput, settings: Settings, cancel: Callable[[], bool]
 ) -> gc.TriangleMesh:
+    mesh = _read_mesh(mesh_input, settings, cancel)
+    if len(mesh.vertices) > settings.max_vertices:  # which lengths alone do not tell before
+        raise gc.errors.TooManyVertices(len(mesh.vertices), settings.max_vertices)
+    return mesh
+
+
+def _read_mesh(
+    mesh_input: MeshInput, settings: Settings, cancel: Callable[[], bool]
+) -> gc.TriangleMesh:
     max_faces, max_vertices = settings.max_faces, settings.max_vertices
     faces: NDArray[np.int32] | NDArray[np.int64]
+    vertices: NDArray[np.float64] | None
+    lengths: NDArray[np.float64] | None = None
     sample: gc.TriangleMesh | None = None
     match mesh_input:
         case MeshFromSample():
@@ -323,35 +334,40 @@ def _make_mesh(
             vertices, faces = sample.vertices, sample.faces
         case MeshFromFile(path=path, file_type="json"):
             refuse_beyond_limit(_JSON_GROWS * path.stat().st_size)
-            vertices, faces = read_json_mesh(path.read_bytes())
+            faces, vertices, lengths = read_json_mesh(path.read_bytes())
         case MeshFromFile(path=path):
             max_bytes = most_unpacked(path.stat().st_size, settings.max_upload_bytes)
             try:
-                mesh = gc.load_mesh(
-                    path,
-                    mesh_input.file_type,
-                    mesh_input.merge,
-                    max_faces=max_faces,
-                    max_vertices=max_vertices,
-                    max_bytes=max_bytes,
-                    cancel=cancel,
-                )
+                with naming((gc.errors.InvalidArgument, _MERGE)):
+                    return gc.load_mesh(
+                        path,
+                        mesh_input.file_type,
+                        mesh_input.merge,
+                        max_faces=max_faces,
+                        max_vertices=max_vertices,
+                        max_bytes=max_bytes,
+                        cancel=cancel,
+                    )
             except gc.errors.FileTooLarge:
                 raise too_large_unpacked(max_bytes, settings.max_upload_bytes) from None
-            if not mesh.has_positions:
-                raise gc.errors.InvalidMesh(
-                    "the NPZ file has no vertices, whose positions answers tell: add them",
-                    kind="vertex",
-                )
-            return mesh
     if len(faces) > max_faces:
         raise gc.errors.TooManyFaces(len(faces), max_faces)
-    if len(vertices) > max_vertices:
+    if vertices is not None and len(vertices) > max_vertices:
         raise gc.errors.TooManyVertices(len(vertices), max_vertices)
     if sample is not None and mesh_input.merge == "none":
         return sample
     _stop_if(cancel)
-    return gc.TriangleMesh(vertices, faces, merge=mesh_input.merge)
+    if lengths is None:
+        assert vertices is not None, "one of both tells the lengths of edges"  # noqa: S101
+        return gc.TriangleMesh(vertices, faces, merge=mesh_input.merge)
+    if mesh_input.merge != "none":
+        message = "merge must be 'none' for a surface that is given by its lengths"
+        raise invalid_fields([_MERGE], message)
+    return gc.TriangleMesh.from_lengths(faces, lengths, vertices)
+
+
+_MERGE = "/query/merge"
+"""Where the parameter is that says how vertices are merged"""
 
 
 _JSON_GROWS = 40

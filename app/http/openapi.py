@@ -41,9 +41,9 @@ SERVERS = [
 TAGS = [
     {
         "name": "queries",
-        "description": "Distances, paths, isolines, borders, matrices and nearest points on a "
-        "stored mesh. Each query answers in JSON, or in other formats by `Accept` or `format`. "
-        "With `Prefer: respond-async` it becomes a job.",
+        "description": "Distances, paths, log maps, straight lines, isolines, borders, matrices "
+        "and nearest points on a stored mesh. Each query answers in JSON, or in other formats by "
+        "`Accept` or `format`. With `Prefer: respond-async` it becomes a job.",
     },
     {
         "name": "meshes",

@@ -22,7 +22,7 @@ from app.jobs import Job
 from app.schemas.service import ProblemDocument
 from app.service.answering import PhaseSeconds
 from app.service.service import Manifest
-from app.store.meshes import PUBLIC_ARRAYS
+from app.store.meshes import public_arrays
 from app.store.objects import RemoteBody, RemoteFile
 from app.store.results import Result, ResultStore
 
@@ -49,7 +49,13 @@ WORK_PROBLEMS = (
     "storage_full",
 )
 """Codes of the problems that any work can meet"""
-QUERY_PROBLEMS = ("mesh_not_found", "result_too_large", "invalid_point", *WORK_PROBLEMS)
+QUERY_PROBLEMS = (
+    "mesh_not_found",
+    "result_too_large",
+    "invalid_point",
+    "not_embedded",
+    *WORK_PROBLEMS,
+)
 """Codes of the problems that a well-formed query can meet, at once or as a job"""
 
 
@@ -127,14 +133,15 @@ def listed_mesh(manifest: Manifest) -> dict[str, Any]:
 def mesh_document(manifest: Manifest, prefix: str) -> dict[str, Any]:
     """Return the document of a mesh: its report, and the links to its arrays."""
     mesh_id = manifest["id"]
-    names = [name for name, stored in PUBLIC_ARRAYS.items() if stored in manifest["crc32"]]
     return {
         "id": mesh_id,
         "name": manifest.get("name"),  # earlier releases stored none
         **manifest["report"],
         "warnings": manifest["warnings"],
         "created": manifest["created"],
-        "arrays": {name: f"{prefix}/v1/meshes/{mesh_id}/arrays/{name}" for name in names},
+        "arrays": {
+            name: f"{prefix}/v1/meshes/{mesh_id}/arrays/{name}" for name in public_arrays(manifest)
+        },
     }
 
 

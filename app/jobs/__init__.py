@@ -2,7 +2,7 @@
 
 from app.jobs.job import Job, JobSpec
 from app.jobs.manager import JobManager
-from app.jobs.repository import JobRepository, read_jobs, read_shared_jobs
+from app.jobs.repository import JobRepository, read_jobs
 from app.jobs.retention import Retention
 from app.jobs.runner import JobRunner
 
@@ -14,5 +14,4 @@ __all__ = [
     "JobSpec",
     "Retention",
     "read_jobs",
-    "read_shared_jobs",
 ]

@@ -11,12 +11,10 @@ from app.schemas.service import JobStatus
 
 
 class JobSpec(BaseModel):
-    """What a job is to do, but for its query, and its owner."""
+    """What a job is to do, but for its query, and who asked for it."""
 
     model_config = ConfigDict(frozen=True)
 
-    owner: str | None
-    """Name of the API key; nobody else sees the job. None without keys"""
     kind: str
     """Kind of query, such as ``distances``"""
     mesh_id: str
@@ -27,11 +25,11 @@ class JobSpec(BaseModel):
     coding: str | None = None
     """Content coding of the answer"""
     client: str = ""
-    """Name of the caller; callers take turns"""
+    """Name of the caller: callers take turns, and have a share of the room for answers"""
     fingerprint: str
     """Hash of the query and its representation"""
     idempotency_key: str | None = None
-    """Key that the owner chose: two requests with one key are one job"""
+    """Key that the client chose: two requests with one key are one job"""
     request_id: str
     """Id of the request that submitted the job"""
 
@@ -99,7 +97,7 @@ class EndedJob(NamedTuple):
     """A finished job, as far as its retention needs it; any release can read that."""
 
     id: str
-    owner: str | None
+    client: str
     result: str | None
     """Name of its answer in the result store"""
     finished: datetime
@@ -108,7 +106,7 @@ class EndedJob(NamedTuple):
     def of(cls, job: Job) -> "EndedJob":
         """Return that of a job which has finished."""
         assert job.finished is not None, "it has finished"  # noqa: S101
-        return cls(job.id, job.spec.owner, job.result, job.finished)
+        return cls(job.id, job.spec.client, job.result, job.finished)
 
 
 def _now_after(earlier: datetime) -> datetime:

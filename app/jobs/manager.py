@@ -6,9 +6,9 @@ from collections.abc import AsyncIterator
 from contextlib import suppress
 from typing import Protocol
 
-from app.errors import Fault, over_limit, problem
+from app.errors import Fault, problem
 from app.jobs.job import EndedJob, Job, JobSpec
-from app.jobs.repository import JobRecords, JobRepository
+from app.jobs.repository import JobRepository
 from app.jobs.retention import Retention
 from app.store.results import Result, ResultStore
 
@@ -19,8 +19,11 @@ WATCH_S = 1.0
 class Runner(Protocol):
     """Runs the jobs that are recorded and have not finished."""
 
+    def start(self, job: Job, query: bytes) -> None:
+        """Say that a job was added."""
+
     def nudge(self) -> None:
-        """Say that jobs were added or dismissed."""
+        """Say that jobs were dismissed, or may have been added."""
 
     def forget(self, job_id: str) -> None:
         """Say that a finished job was removed."""
@@ -29,23 +32,17 @@ class Runner(Protocol):
 class JobManager:
     """The records of jobs; what is added there, a runner runs.
 
-    An owner has at most ``quota`` jobs, finished ones included; None stands for no quota. Several
-    services may share the records, and the runner. What a client is told is recorded.
+    Several services may share the records, and the runner. What a client is told is recorded.
     """
 
     def __init__(
-        self,
-        repository: JobRepository,
-        results: ResultStore,
-        retention: Retention,
-        quota: int | None,
+        self, repository: JobRepository, results: ResultStore, retention: Retention
     ) -> None:
         self.runner: Runner
         """To be set before the first job"""
         self._repository = repository
         self._results = results
         self._retention = retention
-        self._quota = quota
         self._changed = asyncio.Event()
         self._is_stopping = False
 
@@ -61,7 +58,7 @@ class JobManager:
 
     async def keep_up(self) -> None:
         """Protect the answers of jobs that have finished elsewhere; nudge a runner that is new."""
-        self._retention.keep_up(await self._repository.ended())
+        await self._retention.keep_up(self._repository.ended)
         self.runner.nudge()
 
     async def submit(self, spec: JobSpec, query: bytes) -> Job:
@@ -73,40 +70,37 @@ class JobManager:
         Raises
         ------
         ProblemError
-            The key belongs to another question, or the owner has as many jobs as it may.
+            The key belongs to another question.
         """
-        job = Job(spec=spec)
-        # Two requests with one key at the same time are one job, too.
-        async with self._repository.alone(spec.owner) as records:
-            known = await _find_by_key(records, spec)
-            if known is not None:
-                return known
-            await self._refuse_over_quota(records, spec.owner)
-            await records.add(job, query)
-        self.runner.nudge()
+        new = Job(spec=spec)
+        job = await self._repository.add(new, query)
+        if job.spec.fingerprint != spec.fingerprint:
+            message = f"{spec.idempotency_key!r} was used for a different query, by job {job.id}"
+            fault = Fault("/header/Idempotency-Key", message)
+            raise problem("invalid_request", message, errors=(fault,))
+        if job is new:
+            self.runner.start(job, query)
         return job
 
-    async def find(self, owner: str | None, job_id: str) -> Job:
-        """Return the present state of a job; raises ``ProblemError`` where the owner has none."""
-        job = await self._repository.find(owner, job_id)
+    async def find(self, job_id: str) -> Job:
+        """Return the present state of a job; raises ``ProblemError`` where there is none."""
+        job = await self._repository.find(job_id)
         if job is None:
             raise problem("job_not_found", f"there is no job {job_id!r}")
         return job
 
-    async def page(
-        self, owner: str | None, limit: int, before: int | None
-    ) -> tuple[list[Job], int | None]:
-        """Return ``limit`` jobs of an owner, the newest first, and the number to go on before."""
-        return await self._repository.page(owner, limit, before)
+    async def page(self, limit: int, before: int | None) -> tuple[list[Job], int | None]:
+        """Return ``limit`` jobs, the newest first, and the number to go on before, if any."""
+        return await self._repository.page(limit, before)
 
     async def count(self) -> Counter[str]:
-        """Return the number of jobs of all owners by status."""
+        """Return the number of jobs by status."""
         return Counter(await self._repository.count_by_status())
 
-    async def cancel(self, owner: str | None, job_id: str) -> Job:
+    async def cancel(self, job_id: str) -> Job:
         """Stop a job, and return its last state; one that has finished stays as it is."""
         while True:
-            job = await self.find(owner, job_id)
+            job = await self.find(job_id)
             if job.is_finished:
                 return job
             last = job.dismissed()
@@ -116,15 +110,15 @@ class JobManager:
                 self.runner.nudge()
                 return last
 
-    async def remove(self, owner: str | None, job_id: str) -> Job:
+    async def remove(self, job_id: str) -> Job:
         """Remove a job with its answer, and return its last state; one that runs is stopped."""
-        last = await self.cancel(owner, job_id)
+        last = await self.cancel(job_id)
         await self._repository.remove(job_id)
         self._retention.discard(job_id)
         self.runner.forget(job_id)
         return last
 
-    async def result(self, owner: str | None, job_id: str) -> tuple[Job, Result]:
+    async def result(self, job_id: str) -> tuple[Job, Result]:
         """Acquire the answer of a job.
 
         Raises
@@ -133,7 +127,7 @@ class JobManager:
             There is no such job, it has not finished, it was dismissed, or it failed: then its own
             problem is raised.
         """
-        job = await self.find(owner, job_id)
+        job = await self.find(job_id)
         if job.problem is not None:
             raise problem(**vars(job.problem))
         if job.status == "dismissed":
@@ -160,36 +154,7 @@ class JobManager:
             with suppress(TimeoutError):
                 async with asyncio.timeout(WATCH_S):
                     await changed.wait()
-            now = await self._repository.find(job.spec.owner, job.id)
+            now = await self._repository.find(job.id)
             if now is None:
                 return
             job = now
-
-    async def _refuse_over_quota(self, records: JobRecords, owner: str | None) -> None:
-        if self._quota is None:
-            return
-        count = await records.count(owner)
-        if count < self._quota:
-            return
-        wait_s = self._retention.seconds_to_first(owner) or 1
-        raise over_limit(
-            "quota_exceeded",
-            "jobs of one owner",
-            count + 1,
-            self._quota,
-            "quota_jobs",
-            hint="delete jobs that are not needed any more, and those whose answers you have",
-            headers={"Retry-After": str(wait_s)},
-        )
-
-
-async def _find_by_key(records: JobRecords, spec: JobSpec) -> Job | None:
-    key = spec.idempotency_key
-    job = None if key is None else await records.find_by_key(spec.owner, key)
-    if job is None or job.status in ("failed", "dismissed"):
-        return None
-    if job.spec.fingerprint != spec.fingerprint:
-        message = f"{key!r} was used for a different query, by job {job.id}"
-        fault = Fault("/header/Idempotency-Key", message)
-        raise problem("invalid_request", message, errors=(fault,))
-    return job

@@ -69,6 +69,8 @@ class JobRunner:
         self._solve = solve
         self._on_change = on_change
         self._live: dict[str, asyncio.Task[None]] = {}
+        self._dismissed: set[asyncio.Task[None]] = set()
+        """Tasks of jobs that are no longer to be run, until they have ended"""
         self._ending: set[str] = set()
         """Those of them whose end is being recorded"""
         self._nudged = asyncio.Event()
@@ -80,8 +82,7 @@ class JobRunner:
 
         Jobs that are under way at its end are run again inside the next one.
         """
-        await self._repository.tidy()
-        self._retention.keep_up(await self._repository.ended())
+        await self._retention.keep_up(self._repository.ended)
         self.nudge()
         loops = [
             asyncio.create_task(repeat(self._look, 0.0, "jobs not looked for")),
@@ -93,7 +94,13 @@ class JobRunner:
             self._is_stopping = True
             for task in (*loops, *self._live.values()):
                 task.cancel()
-            await asyncio.gather(*loops, *self._live.values(), return_exceptions=True)
+            tasks = (*loops, *self._live.values(), *self._dismissed)
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+    def start(self, job: Job, query: bytes) -> None:
+        """Begin a job at once: the next request is to find it in the queue, see ``Runner``."""
+        if job.id not in self._live:
+            self._live[job.id] = asyncio.create_task(self._run(job, query))
 
     def nudge(self) -> None:
         """Have the table looked at, see ``Runner``."""
@@ -108,40 +115,47 @@ class JobRunner:
         with suppress(TimeoutError):
             await asyncio.wait_for(self._nudged.wait(), _LOOK_S)
         self._nudged.clear()
+        before = set(self._live)
         unfinished = await self._repository.unfinished()
-        for job_id in self._live.keys() - set(unfinished) - self._ending:
-            self._live.pop(job_id).cancel()
+        for job_id in before - set(unfinished) - self._ending:
+            task = self._live.pop(job_id)
+            self._dismissed.add(task)
+            task.add_done_callback(self._dismissed.discard)
+            task.cancel()
         for job_id in unfinished:
             if job_id not in self._live or self._live[job_id].done():
-                job = await self._take(job_id)  # one after the other: the oldest goes first
-                if job is not None:
-                    self._live[job_id] = asyncio.create_task(self._run(job), name=f"job {job_id}")
+                taken = await self._take(job_id)  # one after the other: the oldest goes first
+                if taken is not None:
+                    self._live[job_id] = asyncio.create_task(self._run(*taken))
 
     async def _tidy(self) -> None:
-        self._retention.keep_up(await self._repository.ended())
+        await self._retention.keep_up(self._repository.ended)
         for job_id in self._retention.due():
             await self._repository.remove(job_id)
             self._retention.discard(job_id)
 
-    async def _take(self, job_id: str) -> Job | None:
-        """Return a job that is to be run, with its new state where it was under way before."""
-        job = await self._repository.load(job_id)
-        if job is None or job.is_finished:
+    async def _take(self, job_id: str) -> tuple[Job, bytes | None] | None:
+        """Return a job that is to be run, in a new state if it was under way, and its query."""
+        found = await self._repository.load_with_query(job_id)
+        if found is None or found[0].is_finished:
             return None
+        job, query = found
         if job.started is None or job.runs >= _MOST_RUNS:
-            return job
+            return job, query
         again = job.accepted_again()
-        return again if await self._record(job, again) else None
+        return (again, query) if await self._record(job, again) else None
 
-    async def _run(self, job: Job) -> None:
+    async def _run(self, job: Job, query: bytes | None) -> None:
         """Run a job to its end; leave it where another process has ended it, or runs it."""
         with bound_contextvars(request_id=job.spec.request_id):
             if job.runs >= _MOST_RUNS:
                 await self._end(job, job.failed(_STOPPED_TOO_OFTEN))
+            elif query is None:  # an older release accepted the job
+                await self._end(job, job.failed(_STOPPED))
             else:
-                await self._work(job)
+                await self._work(job, query)
 
-    async def _work(self, job: Job) -> None:
+    async def _work(self, job: Job, query: bytes) -> None:
         changed, share = asyncio.Event(), -1.0
 
         def note(now: float) -> None:
@@ -149,7 +163,7 @@ class JobRunner:
             share = round(now, 4)
             changed.set()
 
-        working = asyncio.create_task(self._answer(job, note))
+        working = asyncio.ensure_future(self._solve(job.spec, query, note))
         working.add_done_callback(lambda _: changed.set())
         try:
             while True:
@@ -169,21 +183,15 @@ class JobRunner:
             raise
         await self._finish(job, working)
 
-    def _abandon(self, working: "asyncio.Task[Result]") -> None:
+    def _abandon(self, working: "asyncio.Future[Result]") -> None:
         working.cancel()
         working.add_done_callback(self._release)
 
-    def _release(self, worked: "asyncio.Task[Result]") -> None:
+    def _release(self, worked: "asyncio.Future[Result]") -> None:
         if not worked.cancelled() and worked.exception() is None:
             self._results.release(worked.result())
 
-    async def _answer(self, job: Job, on_progress: ProgressCallback) -> Result:
-        query = await self._repository.query(job.id)
-        if query is None:  # an older release accepted the job
-            raise ProblemError(_STOPPED)
-        return await self._solve(job.spec, query, on_progress)
-
-    async def _finish(self, job: Job, working: "asyncio.Task[Result]") -> None:
+    async def _finish(self, job: Job, working: "asyncio.Future[Result]") -> None:
         try:
             result = working.result()
         except Exception as error:
@@ -197,14 +205,16 @@ class JobRunner:
             await self._end(job, job.failed(problem))
             return
         try:
-            self._results.pin_within_quota(result.name, job.spec.owner)
-            last = job.successful(result.name)
-            self._retention.add(EndedJob.of(last))  # which pins it as well
-            self._results.unpin(result.name, job.spec.owner)
+            self._results.pin_within_quota(result.name, job.spec.client)
         except ProblemError as error:
-            last = job.failed(error.problem)
+            self._results.release(result)
+            await self._end(job, job.failed(error.problem))
+            return
         self._results.release(result)
-        await self._end(job, last)
+        try:
+            await self._end(job, job.successful(result.name))  # which pins it as well
+        finally:
+            self._results.unpin(result.name, job.spec.client)
 
     async def _end(self, job: Job, last: Job) -> None:
         self._ending.add(job.id)
@@ -222,7 +232,7 @@ class JobRunner:
             try:
                 is_ours = await self._repository.update(job, before.version)
                 if not is_ours:  # it may have been recorded, although the database could not say so
-                    is_ours = await self._repository.load(job.id) == job
+                    is_ours = await self._repository.find(job.id) == job
             except OSError:
                 logger.exception("state of a job not recorded, to be tried again", job_id=job.id)
                 await asyncio.sleep(_RETRY_S)

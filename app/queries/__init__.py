@@ -16,15 +16,18 @@ from app.queries.base import (
     result_key,
 )
 from app.queries.borders import BordersQuery
+from app.queries.boundaries import BoundariesQuery
 from app.queries.distances import DistancesQuery
 from app.queries.field_cache import FieldCache, Unwritten
 from app.queries.isolines import IsolinesQuery
 from app.queries.locate import LocateQuery
+from app.queries.log_map import LogMapQuery
 from app.queries.matrix import MatrixQuery
 from app.queries.nearest import NearestQuery
 from app.queries.path import PathQuery, naming_parameters, written_request
 from app.queries.paths import PathsQuery
 from app.queries.steps import StepsQuery
+from app.queries.trace import TraceQuery
 from app.queries.validation import MeshSize, check_lengths
 
 KINDS: Mapping[str, type[Query[Any]]] = {
@@ -36,8 +39,11 @@ KINDS: Mapping[str, type[Query[Any]]] = {
         PathsQuery,
         IsolinesQuery,
         BordersQuery,
+        BoundariesQuery,
         MatrixQuery,
         NearestQuery,
+        LogMapQuery,
+        TraceQuery,
         LocateQuery,
     )
 }
@@ -47,11 +53,13 @@ __all__ = [
     "KINDS",
     "SMALL_SECONDS",
     "BordersQuery",
+    "BoundariesQuery",
     "DistancesQuery",
     "ExecutionContext",
     "FieldCache",
     "IsolinesQuery",
     "LocateQuery",
+    "LogMapQuery",
     "MatrixQuery",
     "MeshSize",
     "NearestQuery",
@@ -59,6 +67,7 @@ __all__ = [
     "PathsQuery",
     "Query",
     "StepsQuery",
+    "TraceQuery",
     "Unwritten",
     "check_lengths",
     "code_version",

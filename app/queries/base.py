@@ -24,7 +24,7 @@ from app.queries.validation import (
     check_barriers,
     check_json_size,
     check_points,
-    invalid_fields,
+    naming,
 )
 from app.schemas.points import StrictModel
 from app.schemas.requests import AmongBarriers
@@ -207,10 +207,8 @@ class Query(ABC, Generic[R]):
 
     def with_barriers(self, opened: OpenMesh) -> OpenMesh:
         """Return a mesh with the ``barriers``, or refuse those that leave nothing of it."""
-        try:
+        with naming((gc.errors.InvalidArgument, "/barriers")):
             return opened.with_barriers(self.barriers)
-        except gc.errors.InvalidArgument as error:
-            raise invalid_fields(["/barriers"], str(error)) from None
 
     def answer(self, opened: OpenMesh, context: ExecutionContext) -> Answer:
         """Compute the answer on an open mesh that has the ``barriers``.

@@ -1,9 +1,7 @@
 """Borders between the territories of sources."""
 
 import math
-from typing import Any
 
-import geodesic_core as gc
 from app.encoding import Answer
 from app.queries.accuracy import solve_field, stats_of
 from app.queries.base import ExecutionContext
@@ -11,7 +9,8 @@ from app.queries.cost_model import PER_FACE_DIVIDED, faces_crossed, sweep_second
 from app.queries.from_sources import FromSources
 from app.queries.lines import (
     OFFERS,
-    VALUES_OF_LINE_POINT,
+    are_located,
+    count_values,
     describe_line,
     resolved_chord_error,
 )
@@ -54,9 +53,12 @@ class BordersQuery(FromSources[BordersRequest]):
             opened, EXACT, starts, context.part(0, 2), max_distance=request.max_distance
         )
         borders = field.borders(chord_error, **context.part(1, 2).options)
-        values = VALUES_OF_LINE_POINT * sum(len(border.points) for border in borders)
-        check_json_size(values, context.max_values, self.hint)
-        found = [describe_border(border) for border in borders]
+        located = are_located(opened.mesh, request)
+        check_json_size(count_values(borders, located=located), context.max_values, self.hint)
+        found = [
+            {"sources": border.sources, **describe_line(border, located=located)}
+            for border in borders
+        ]
         members = self.members(
             opened,
             chord_error=chord_error,
@@ -64,9 +66,6 @@ class BordersQuery(FromSources[BordersRequest]):
             borders=found,
             stats=stats_of(field.stats),
         )
-        return Answer(members, shown=("borders",), lines=lambda: lines_of_borders(found))
-
-
-def describe_border(border: gc.Border) -> dict[str, Any]:
-    """Return the members of a border."""
-    return {"sources": border.sources, **describe_line(border)}
+        return Answer(
+            members, shown=("borders",), lines=lambda: lines_of_borders(found, located=located)
+        )

@@ -28,7 +28,7 @@ from app.queries.points import (
     numbered,
     to_sources,
 )
-from app.queries.validation import WrittenPoints, invalid_fields
+from app.queries.validation import WrittenPoints, invalid_fields, naming
 from app.queries.views import columns_of, surface_of, table_of_distances
 from app.schemas.requests import DistancesRequest
 from app.store.meshes import OpenMesh
@@ -84,6 +84,9 @@ class DistancesQuery(FromSources[DistancesRequest]):
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep once."""
         request, mesh = self.request, opened.mesh
+        if "gradient" in request.include:
+            with naming((gc.errors.NotEmbedded, "/include")):
+                mesh.require_embedded("a gradient")
         count = self.source_count
         sources, targets = points[:count], None if request.targets is None else points[count:]
         starts = to_sources(mesh, request.sources, sources)

@@ -1,6 +1,6 @@
-"""Lines of equal distance."""
+"""Lines of equal distance, or of equal value."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,30 +8,41 @@ from numpy.typing import NDArray
 
 import geodesic_core as gc
 from app.encoding import Answer
+from app.errors import pointer
 from app.queries.accuracy import (
+    CERTAIN,
     bound_of,
     solve_field,
     stats_of,
     with_default_accuracy,
 )
 from app.queries.base import ExecutionContext
-from app.queries.cost_model import PER_FACE_CROSSED, faces_crossed, sweep_seconds
+from app.queries.cost_model import (
+    PER_FACE_CROSSED,
+    PER_FACE_SCANNED,
+    faces_crossed,
+    sweep_seconds,
+)
 from app.queries.from_sources import FromSources
 from app.queries.lines import (
     OFFERS,
-    VALUES_OF_LINE_POINT,
+    are_located,
+    count_values,
     describe_line,
     resolved_chord_error,
 )
 from app.queries.points import (
     SurfacePoints,
+    checkpoint,
     describe_source,
     to_sources,
 )
 from app.queries.validation import (
+    FAULTS_SHOWN,
     check_count,
     check_json_size,
     invalid_fields,
+    naming,
 )
 from app.queries.views import lines_of
 from app.schemas.requests import IsolinesRequest
@@ -40,10 +51,22 @@ from app.store.meshes import OpenMesh
 
 _VALUES_OF_LEVEL = 1
 """Values in JSON of a level itself."""
+_OF_DISTANCES = (
+    "sources",
+    "method",
+    "relative_error",
+    "absolute_error",
+    "max_distance",
+    "chord_error",
+)
+"""Members that do not go with values"""
+
+Drawn = tuple[dict[str, Any], list[float], Iterable[Sequence[gc.SurfaceCurve]]]
+"""Members of an answer, its levels, and the lines of each, drawn one level after the other"""
 
 
 class IsolinesQuery(FromSources[IsolinesRequest]):
-    """The points at some distances from ``sources``, as polylines."""
+    """The points at some distances from ``sources``, or with some ``values``, as polylines."""
 
     kind = "isolines"
     model = IsolinesRequest
@@ -52,11 +75,19 @@ class IsolinesQuery(FromSources[IsolinesRequest]):
 
     @classmethod
     def normalized(cls, request: IsolinesRequest) -> IsolinesRequest:
-        """Name the error; refuse levels and count together, or neither."""
+        """Name the error; refuse levels and count together, or neither; likewise what is drawn."""
         if request.levels is None and request.count is None:
             raise invalid_fields(["/levels"], "give levels, or count for evenly spaced levels")
         if request.levels is not None and request.count is not None:
             raise invalid_fields(["/count"], "does not go with levels")
+        if request.values is not None:
+            _refuse_members_of_distances(request)
+            return request
+        if not request.sources:
+            are_missing = "sources" not in request.model_fields_set
+            message = "give sources, or values" if are_missing else "give at least one source"
+            raise invalid_fields(["/sources"], message)
+        _refuse_levels_below_0(request)
         return with_default_accuracy(request)
 
     def check_limits(self, settings: Settings) -> None:
@@ -64,15 +95,40 @@ class IsolinesQuery(FromSources[IsolinesRequest]):
         super().check_limits(settings)
         check_count("levels", self._level_count, settings, "max_levels")
 
+    @property
+    def affinity_keys(self) -> tuple[str, ...]:
+        """The field of the sources, if any, and the mesh."""
+        return (self.mesh_id,) if self.request.values is not None else super().affinity_keys
+
     def rough_seconds(self) -> float:
-        """Return the cost of two sweeps to the limit, and of the lines."""
-        request = self.request
-        sweep = sweep_seconds(self.size.faces, request, self.share)
-        crossed = faces_crossed(self.size.faces, self._level_count, self.share)
-        return 2 * sweep + PER_FACE_CROSSED * crossed
+        """Return the cost of two sweeps to the limit, or of a look at all values; and of lines."""
+        request, faces = self.request, self.size.faces
+        crossed = PER_FACE_CROSSED * faces_crossed(faces, self._level_count, self.share)
+        if request.values is not None:
+            return PER_FACE_SCANNED * faces * self._level_count + crossed
+        return 2 * sweep_seconds(faces, request, self.share) + crossed
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
-        """Sweep, then draw level by level, as long as the lines fit into the answer."""
+        """Draw level by level, as long as the lines fit into the answer."""
+        if self.request.values is None:
+            about, levels, drawn = self._of_distances(opened, points, context)
+        else:
+            about, levels, drawn = self._of_values(opened, context)
+        located = are_located(opened.mesh, self.request)
+        found: list[dict[str, Any]] = []
+        values = 0
+        for level, lines in zip(levels, drawn, strict=True):
+            values += _VALUES_OF_LEVEL + count_values(lines, located=located)
+            check_json_size(values, context.max_values, self.hint)
+            described = [describe_line(line, located=located) for line in lines]
+            found.append({"level": level, "lines": described})
+        members = self.members(opened, **about, isolines=found)
+        return Answer(members, shown=("isolines",), lines=lambda: lines_of(found, located=located))
+
+    def _of_distances(
+        self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext
+    ) -> Drawn:
+        """Sweep, and return the lines that a further sweep draws."""
         chord_error = resolved_chord_error(opened.mesh, self.request.chord_error)
         starts = to_sources(opened.mesh, self.request.sources, points)
         field = solve_field(
@@ -83,43 +139,68 @@ class IsolinesQuery(FromSources[IsolinesRequest]):
             max_distance=self.request.max_distance,
             isolines=True,
         )
-        found: list[dict[str, Any]] = []
-        values = 0
-        levels = self._levels(field.distances)
+        levels = self.request.levels
+        if levels is None:
+            with naming((gc.errors.InvalidArgument, "/count")):
+                levels = gc.spaced_levels(field.distances, self._level_count).tolist()
+        about = {
+            "method": self.request.method,
+            "error_bound": bound_of(field.error_bound),
+            "chord_error": chord_error,
+            "sources": [describe_source(opened.mesh, start) for start in starts],
+            "stats": stats_of(field.stats),
+        }
         drawn = field.each_isoline(levels, chord_error, **context.part(1, 2).options)
-        for level, lines in zip(levels, drawn, strict=True):
-            values += _VALUES_OF_LEVEL
-            values += VALUES_OF_LINE_POINT * sum(len(line.points) for line in lines)
-            check_json_size(values, context.max_values, self.hint)
-            found.append(describe_level(level, lines))
-        members = self.members(
-            opened,
-            method=self.request.method,
-            error_bound=bound_of(field.error_bound),
-            chord_error=chord_error,
-            sources=[describe_source(opened.mesh, start) for start in starts],
-            isolines=found,
-            stats=stats_of(field.stats),
-        )
-        return Answer(members, shown=("isolines",), lines=lambda: lines_of(found))
+        return about, levels, drawn
+
+    def _of_values(self, opened: OpenMesh, context: ExecutionContext) -> Drawn:
+        """Return the lines of the values, which are straight in each face."""
+        with naming((gc.errors.InvalidArgument, "/values")):
+            field = gc.ScalarField(opened.mesh, np.array(self.request.values, np.float64))
+        levels = self.request.levels
+        if levels is None:
+            levels = _levels_between(field.values, self._level_count)
+
+        def drawn() -> Iterator[Sequence[gc.SurfaceCurve]]:
+            for i, level in enumerate(levels):
+                checkpoint(context.cancel)
+                yield field.isolines([level])[0]
+                context.progress((i + 1) / len(levels))
+
+        about = {
+            "method": "exact",
+            "error_bound": CERTAIN,
+            "chord_error": 0.0,
+            "sources": [],
+            "stats": {},
+        }
+        return about, levels, drawn()
 
     @property
     def _level_count(self) -> int:
         request = self.request
         return len(request.levels) if request.levels is not None else request.count or 0
 
-    def _levels(self, distances: NDArray[np.float64]) -> list[float]:
-        """Return the levels of the request; refuse to space some where only sources are reached."""
-        request = self.request
-        if request.levels is not None:
-            return request.levels
-        try:
-            levels = gc.spaced_levels(distances, self._level_count)
-        except gc.errors.InvalidArgument as error:
-            raise invalid_fields(["/count"], str(error)) from None
-        return [float(level) for level in levels]
+
+def _refuse_members_of_distances(request: IsolinesRequest) -> None:
+    fields = IsolinesRequest.model_fields
+    wrong = [name for name in _OF_DISTANCES if getattr(request, name) != fields[name].default]
+    if wrong:
+        raise invalid_fields(list(map(pointer, wrong)), "does not go with values")
 
 
-def describe_level(level: float, lines: Sequence[gc.Isoline]) -> dict[str, Any]:
-    """Return the members of a level."""
-    return {"level": level, "lines": [describe_line(line) for line in lines]}
+def _refuse_levels_below_0(request: IsolinesRequest) -> None:
+    levels = enumerate(request.levels or ())
+    wrong = [pointer("levels", i) for i, level in levels if level <= 0.0]
+    if wrong:
+        raise invalid_fields(wrong[:FAULTS_SHOWN], "a distance must be greater than 0")
+
+
+def _levels_between(values: NDArray[np.float64], count: int) -> list[float]:
+    """Return levels evenly spaced between the lowest and the highest value, both left out."""
+    present = values[np.isfinite(values)]
+    if not len(present) or present.min() == present.max():
+        raise invalid_fields(["/count"], "no two values differ, so that no level lies between")
+    shares = np.arange(1, count + 1) / (count + 1)
+    levels: list[float] = (present.min() * (1.0 - shares) + present.max() * shares).tolist()
+    return levels

@@ -11,7 +11,7 @@ from app.errors import Fault
 from app.queries.base import VALUES_OF_POINT, ExecutionContext, Query
 from app.queries.cost_model import PER_POSITION
 from app.queries.points import SurfacePoints, checkpoint, describe_point
-from app.queries.validation import invalid_points
+from app.queries.validation import invalid_points, naming
 from app.queries.views import table_of_points
 from app.schemas.requests import LocateRequest
 from app.store.meshes import OpenMesh
@@ -35,6 +35,8 @@ class LocateQuery(Query[LocateRequest]):
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Locate one position after the other."""
+        with naming((gc.errors.NotEmbedded, "/points")):
+            opened.mesh.require_positions("locate")
         found = []
         for i in range(len(self.request.points)):
             checkpoint(context.cancel)

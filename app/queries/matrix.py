@@ -306,7 +306,9 @@ class _Side:
             described = [describe_point(self.mesh, point) for point in self.points[part]]
         else:
             indices = range(len(self))[part]
-            positions = self.mesh.vertices[part].tolist()
+            positions = [None] * len(indices)
+            if self.mesh.has_positions:
+                positions = self.mesh.vertices[part].tolist()
             described = [
                 {"vertex": vertex, "position": position}
                 for vertex, position in zip(indices, positions, strict=True)

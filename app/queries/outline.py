@@ -2,6 +2,9 @@
 
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 import geodesic_core as gc
 from app.queries.accuracy import CERTAIN, bound_of
 
@@ -11,17 +14,30 @@ SHOWN = "points", "locations", "faces"
 
 def outline_of(path: gc.GeodesicPath) -> dict[str, Any]:
     """Return the members of a path."""
+    return {"status": "ok", **polyline_of(path), "error_bound": bound_of(path.error_bound)}
+
+
+def polyline_of(path: gc.GeodesicPath) -> dict[str, Any]:
+    """Return the members of a path or a line as a polyline; its points only where it has any."""
     return {
-        "status": "ok",
         "length": path.length,
-        "points": path.points,
-        "locations": [
-            {"face": location.face_index, "barycentric": location.barycentric}
-            for location in path.locations
-        ],
+        "points": points_of(path),
+        "locations": locations_of(path),
         "faces": path.faces,
-        "error_bound": bound_of(path.error_bound),
     }
+
+
+def points_of(curve: gc.SurfaceCurve) -> NDArray[np.float64] | None:
+    """Return the points of a curve; None on a mesh without positions."""
+    return curve.points if curve.mesh is None or curve.mesh.has_positions else None
+
+
+def locations_of(curve: gc.SurfaceCurve) -> list[dict[str, Any]]:
+    """Return the members of the points of a curve on the surface."""
+    return [
+        {"face": location.face_index, "barycentric": location.barycentric}
+        for location in curve.locations
+    ]
 
 
 def no_outline(reason: str, field: gc.DistanceField | None = None) -> dict[str, Any]:

@@ -83,11 +83,11 @@ class PathQuery(Query[PathRequest]):
                 path = field.path_to(target, **context.options)
         except gc.errors.NoPath as error:
             return self._answer(opened, points, no_outline(error.reason, field))
-        return self._answer(opened, points, outline_of(path), VALUES_OF_POINT * len(path.points))
+        answer = self._answer(opened, points, outline_of(path))
+        values = VALUES_OF_POINT * len(path.locations)
+        return replace(answer, values=values, array=lambda: path.points)
 
-    def _answer(
-        self, opened: OpenMesh, points: SurfacePoints, found: dict[str, Any], values: int = 0
-    ) -> Answer:
+    def _answer(self, opened: OpenMesh, points: SurfacePoints, found: dict[str, Any]) -> Answer:
         source, target, *waypoints = (describe_point(opened.mesh, point) for point in points)
         members = self.members(
             opened,
@@ -96,7 +96,7 @@ class PathQuery(Query[PathRequest]):
             target=target,
             waypoints=waypoints,
         )
-        return Answer(members | found, ("points",), SHOWN, values, lines=lambda: [line_of(found)])
+        return Answer(members | found, ("points",), SHOWN, lines=lambda: [line_of(found)])
 
 
 # As a GET

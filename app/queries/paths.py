@@ -92,7 +92,7 @@ class PathsQuery(Query[PathsRequest]):
             except gc.errors.NoPath as error:
                 found.append(no_outline(error.reason, field))
                 continue
-            values += VALUES_OF_POINT * len(path.points)
+            values += VALUES_OF_POINT * len(path.locations)
             check_json_size(values, context.max_values, self.hint)
             found.append(outline_of(path))
         paths = [

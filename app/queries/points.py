@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 import geodesic_core as gc
 from app.errors import Fault
-from app.queries.validation import FAULTS_SHOWN, WrittenPoints, invalid_points
+from app.queries.validation import FAULTS_SHOWN, WrittenPoints, invalid_points, naming
 from app.schemas.points import (
     Curve,
     EdgePoint,
@@ -74,6 +74,9 @@ def resolve_points(
     faults: list[Fault] = []
     for pointer, point in written:
         checkpoint(cancel)
+        if not mesh.has_positions and isinstance(point, PositionPoint):
+            with naming((gc.errors.NotEmbedded, f"{pointer}/position")):
+                mesh.require_positions("a point by its position")
         try:
             points.append(resolve_point(mesh, point))
         except gc.errors.InvalidPoint as error:
@@ -126,7 +129,8 @@ def notes_on(
 def name_of(pointer: str) -> str:
     """Return how sentences call the point at a pointer, such as ``Source 2`` or ``The target``."""
     name, *numbers = (part for part in pointer.split("/") if part not in ("", "polyline"))
-    named = f"{name[:-1]} {numbers.pop(0)}" if name.endswith("s") else f"the {name}"
+    is_list = name.endswith("s") and bool(numbers)  # and not an axis
+    named = f"{name[:-1]} {numbers.pop(0)}" if is_list else f"the {name.replace('_', ' ')}"
     if not numbers:
         return named.capitalize()
     return f"Point {numbers[0]} of {named}"
@@ -190,11 +194,12 @@ def components_of(mesh: gc.TriangleMesh, points: SurfacePoints) -> NDArray[np.in
 
 
 def describe_point(mesh: gc.TriangleMesh, point: gc.SurfacePoint) -> Mapping[str, Any]:
-    """Return the members of a resolved point: vertex, or face and weights, and position."""
+    """Return the members of a resolved point: vertex, or face and weights, and any position."""
     vertex = point.vertex_index
     if vertex is not None:  # queries have thousands, and the mesh would check each again
-        return {"vertex": vertex, "position": mesh.vertices[vertex].tolist()}
-    position = mesh.position(point).tolist()
+        position = mesh.vertices[vertex].tolist() if mesh.has_positions else None
+        return {"vertex": vertex, "position": position}
+    position = mesh.position(point).tolist() if mesh.has_positions else None
     return {"face": point.face_index, "barycentric": point.barycentric, "position": position}
 
 

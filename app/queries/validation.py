@@ -1,11 +1,13 @@
 """Checks of a query that need no open mesh: its points, its barriers, and the service's limits."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from itertools import islice
 from typing import Any, NamedTuple
 
 import geodesic_core as gc
-from app.errors import Fault, ProblemError, over_limit, problem
+from app.errors import Fault, ProblemError, over_limit, problem, problem_of
 from app.schemas.points import BareVertex, EdgePoint, FacePoint, Point, VertexPoint
 from app.schemas.requests import QueryBody
 from app.settings import Settings
@@ -32,6 +34,24 @@ def invalid_fields(pointers: Sequence[str], message: str) -> ProblemError:
 def invalid_points(faults: Sequence[Fault]) -> ProblemError:
     """Return the exception for points that are not on the mesh."""
     return problem("invalid_point", detail_of(faults), errors=tuple(faults))
+
+
+@contextmanager
+def naming(*members: tuple[type[gc.errors.GeodesicError], str]) -> Iterator[None]:
+    """Name the member of the request that an error of the library is about, by kind of error.
+
+    The first kind that matches counts. An ``{index}`` in a pointer is that of the error.
+    """
+    try:
+        yield
+    except gc.errors.GeodesicError as error:
+        for kind, pointer in members:
+            if isinstance(error, kind):
+                fault = Fault(pointer.format(index=getattr(error, "index", 0)), str(error))
+                raise ProblemError(
+                    replace(problem_of(error), detail=detail_of([fault]), errors=(fault,))
+                ) from None
+        raise
 
 
 def check_count(

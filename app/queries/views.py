@@ -1,6 +1,7 @@
 """Answers as tables, lines and surfaces, for the formats that are written from these."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -35,19 +36,33 @@ def line_of(outline: Mapping[str, Any], number: int | None = None) -> Line:
     """Return a path, or the reason why there is none; its ``number`` where there are several."""
     properties: dict[str, Any] = {} if number is None else {"path": number}
     properties |= {"status": outline.get("reason", "ok"), "length": outline["length"]}
-    locations = outline["locations"] or ()
-    columns: dict[str, list[Any]] = {"face": [each["face"] for each in locations]}
-    columns |= {x: [each["barycentric"][i] for each in locations] for i, x in enumerate("uvw")}
-    points = np.empty((0, 3)) if outline["points"] is None else outline["points"]
-    return Line(points, properties, "" if number is None else f"path_{number}", at_points=columns)
+    return polyline(outline, properties, "" if number is None else f"path_{number}")
 
 
-def lines_of(levels: Sequence[Mapping[str, Any]]) -> list[Line]:
-    """Return isolines, and a line without points for each level that has none."""
+def polyline(described: Mapping[str, Any], properties: Mapping[str, Any], group: str) -> Line:
+    """Return a described path or line, with the locations of its points if it has that member."""
+    columns: dict[str, list[Any]] = {}
+    points = described["points"]
+    if "locations" in described:
+        locations = described["locations"] or ()
+        columns = {"face": [each["face"] for each in locations]}
+        columns |= {x: [each["barycentric"][i] for each in locations] for i, x in enumerate("uvw")}
+        if points is None:
+            points = np.full((len(locations), 3), np.nan)
+    return Line(points, properties, group, bool(described.get("closed")), columns)
+
+
+def _no_line(*, located: bool) -> dict[str, Any]:
+    """Return what stands for a line where there is none."""
     none = {"closed": None, "length": None, "points": np.empty((0, 3))}
+    return none | ({"locations": ()} if located else {})
+
+
+def lines_of(levels: Sequence[Mapping[str, Any]], *, located: bool) -> list[Line]:
+    """Return isolines, and a line without points for each level that has none."""
     return [
-        Line(
-            line["points"],
+        polyline(
+            line,
             {
                 "level": each["level"],
                 "line": i if each["lines"] else None,
@@ -55,19 +70,18 @@ def lines_of(levels: Sequence[Mapping[str, Any]]) -> list[Line]:
                 "length": line["length"],
             },
             f"level_{each['level']!r}",
-            is_closed=bool(line["closed"]),
         )
         for each in levels
-        for i, line in enumerate(each["lines"] or [none])
+        for i, line in enumerate(each["lines"] or [_no_line(located=located)])
     ]
 
 
-def lines_of_borders(borders: Sequence[Mapping[str, Any]]) -> list[Line]:
+def lines_of_borders(borders: Sequence[Mapping[str, Any]], *, located: bool) -> list[Line]:
     """Return borders as lines, or a line without points where there are none."""
-    none = {"sources": (None, None), "closed": None, "length": None, "points": np.empty((0, 3))}
+    none = {"sources": (None, None), **_no_line(located=located)}
     return [
-        Line(
-            border["points"],
+        polyline(
+            border,
             {
                 "line": i if borders else None,
                 "first": border["sources"][0],
@@ -76,10 +90,21 @@ def lines_of_borders(borders: Sequence[Mapping[str, Any]]) -> list[Line]:
                 "length": border["length"],
             },
             f"border_{border['sources'][0]}_{border['sources'][1]}",
-            is_closed=bool(border["closed"]),
         )
         for i, border in enumerate(borders or [none])
     ]
+
+
+def lines_of_boundaries(curves: Sequence[Mapping[str, Any]], *, located: bool) -> list[Line]:
+    """Return boundaries as lines with their vertices, or a line without points for none."""
+    lines = []
+    for i, curve in enumerate(curves or [{"vertices": (), **_no_line(located=located)}]):
+        number = i if curves else None
+        about = {"line": number, "closed": curve["closed"], "length": curve["length"]}
+        line = polyline(curve, about, f"boundary_{i}")
+        columns = {"vertex": curve["vertices"], **line.at_points}
+        lines.append(replace(line, at_points=columns))
+    return lines
 
 
 def table_of_matrix(distances: NDArray[np.float64]) -> Table:
@@ -112,7 +137,7 @@ def table_of_points(index: str, found: Sequence[Mapping[str, Any] | None]) -> Ta
             yield (
                 each.get(index, i),
                 each.get("distance"),
-                *each.get("position", _NOTHING),
+                *(each.get("position") or _NOTHING),
                 each.get("vertex"),
                 each.get("face"),
                 *each.get("barycentric", _NOTHING),

@@ -32,7 +32,9 @@ class ResolvedPoint(BaseModel):
     barycentric: tuple[float, float, float] | None = Field(
         default=None, description="The weights of that face's corners"
     )
-    position: tuple[float, float, float]
+    position: tuple[float, float, float] | None = Field(
+        description="Null on a mesh that is given by the lengths of its edges alone"
+    )
 
 
 class ResolvedCurve(BaseModel):
@@ -83,30 +85,51 @@ class DistancesAnswer(BaseModel):
     warnings: list[str]
 
 
-class IsolineDocument(BaseModel):
-    """A polyline of points at one distance."""
+class Location(BaseModel):
+    """A point of the surface in a face."""
+
+    face: int
+    barycentric: tuple[float, float, float]
+
+
+class LineDocument(BaseModel):
+    """A polyline on the surface."""
 
     closed: bool = Field(
         description="Whether the line leads from its last point back to the first, which is not "
         "repeated"
     )
-    length: float
-    points: list[tuple[float, float, float]]
+    length: float = Field(description="The length in mesh units")
+    points: list[tuple[float, float, float]] | None = Field(
+        description="Null on a mesh that is given by the lengths of its edges alone"
+    )
     faces: list[int] = Field(description="The face of each segment")
+    locations: list[Location] | None = Field(
+        default=None,
+        description="The points again, on the surface: if included, and on a mesh without "
+        "positions",
+    )
+
+
+class IsolineDocument(LineDocument):
+    """A polyline of points at one distance, or of one value."""
 
 
 class IsolineLevel(BaseModel):
-    """The lines at one distance."""
+    """The lines at one distance, or of one value."""
 
-    level: float = Field(description="The distance in mesh units")
+    level: float = Field(description="The distance in mesh units, or the value")
     lines: list[IsolineDocument] = Field(
         description="Closed lines, and open lines that end at the boundary or at an edge of three "
-        "faces or more; empty if no point is at that distance"
+        "faces or more, or where values are missing; empty if no point is at that level"
     )
 
 
 class IsolinesAnswer(BaseModel):
-    """The lines of each level, in the order of the levels."""
+    """The lines of each level, in the order of the levels.
+
+    Of values they are exact, with an error bound and a chord error of 0, without sources.
+    """
 
     kind: Literal["isolines"]
     mesh_id: str
@@ -121,20 +144,13 @@ class IsolinesAnswer(BaseModel):
     warnings: list[str]
 
 
-class BorderDocument(BaseModel):
+class BorderDocument(LineDocument):
     """A polyline of points that are equally near to two sources, and no nearer to a third."""
 
     sources: tuple[int, int] = Field(
         description="The two sources whose territories the line separates: indices into `sources`, "
         "the lower first"
     )
-    closed: bool = Field(
-        description="Whether the line leads from its last point back to the first, which is not "
-        "repeated"
-    )
-    length: float
-    points: list[tuple[float, float, float]]
-    faces: list[int] = Field(description="The face of each segment")
 
 
 class BordersAnswer(BaseModel):
@@ -154,11 +170,21 @@ class BordersAnswer(BaseModel):
     warnings: list[str]
 
 
-class Location(BaseModel):
-    """A point of the surface in a face."""
+class BoundaryDocument(LineDocument):
+    """A polyline of boundary edges, with the surface on its left."""
 
-    face: int
-    barycentric: tuple[float, float, float]
+    vertices: list[int] = Field(description="The vertex at each point")
+
+
+class BoundariesAnswer(BaseModel):
+    """The boundary of the surface, longest curve first; empty for a surface without boundary."""
+
+    kind: Literal["boundaries"]
+    mesh_id: str
+    boundaries: list[BoundaryDocument] = Field(
+        description="Closed lines, and open lines that end at an edge of three faces or more"
+    )
+    warnings: list[str]
 
 
 class SearchStep(BaseModel):
@@ -180,7 +206,10 @@ class Outline(BaseModel):
     status: Literal["ok", "no_path"]
     reason: Literal["disconnected", "beyond_max_distance"] | None = None
     length: float | None = Field(description="The length in mesh units; null without a path")
-    points: list[tuple[float, float, float]] | None
+    points: list[tuple[float, float, float]] | None = Field(
+        description="Null without a path, and on a mesh that is given by the lengths of its edges "
+        "alone"
+    )
     locations: list[Location] | None
     faces: list[int] | None = Field(description="The face of each segment of the path")
     error_bound: ErrorBound
@@ -282,9 +311,64 @@ class NearestAnswer(BaseModel):
     warnings: list[str]
 
 
+class LogMapAnswer(BaseModel):
+    """Where all vertices lie as seen from a source: how far, and in which direction."""
+
+    kind: Literal["log_map"]
+    mesh_id: str
+    source: ResolvedPoint
+    total_angle: float = Field(
+        description="Sum of the angles of the surface around the source, in radians"
+    )
+    distances: list[float | None] = Field(description="In mesh units; `null` where unreachable")
+    angles: list[float | None] = Field(
+        description="The angle on the surface at which the shortest path leaves the source: in "
+        "radians, counter-clockwise seen from outside, from 0 up to `total_angle`. At a boundary, "
+        "angles before the x axis are negative. `null` where unreachable and at the source"
+    )
+    coordinates: list[tuple[float | None, float | None]] = Field(
+        description="Each vertex in the tangent plane; twice `null` where unreachable"
+    )
+    bends: list[int | None] = Field(
+        description="Number of vertices that the path bends at. Behind the first bend all vertices "
+        "have its direction. `null` where unreachable"
+    )
+    unreachable: Unreachable
+    warnings: list[str]
+
+
+class StraightLine(BaseModel):
+    """A straightest line."""
+
+    stopped: Literal["length", "boundary", "barrier", "vertex", "non_manifold"] = Field(
+        description="What it ends at; `length` if it is as long as asked for"
+    )
+    length: float = Field(description="The length in mesh units")
+    end_direction: float | None = Field(
+        description="The direction in which it would go on: an angle at its last point, in "
+        "radians; null if directions have no meaning there"
+    )
+    points: list[tuple[float, float, float]] | None = Field(
+        description="Null on a mesh that is given by the lengths of its edges alone"
+    )
+    locations: list[Location]
+    faces: list[int] = Field(description="The face of each segment")
+
+
+class TraceAnswer(BaseModel):
+    """Straightest lines, in the order of the request."""
+
+    kind: Literal["trace"]
+    mesh_id: str
+    starts: list[ResolvedPoint]
+    lines: list[StraightLine]
+    warnings: list[str]
+
+
 class LocatedPoint(ResolvedPoint):
     """The point of the surface that is nearest to a position."""
 
+    position: tuple[float, float, float]
     distance: float = Field(description="Distance from the position in mesh units")
 
 

@@ -117,7 +117,10 @@ class MeshDocument(BaseModel):
         description="Warnings of one or two sentences each, with the remedy"
     )
     created: str = Field(description="When the mesh was stored, RFC 3339")
-    arrays: dict[str, str] = Field(description="Paths of its arrays, by name")
+    arrays: dict[str, str] = Field(
+        description="Paths of its arrays, by name: `lengths` where those of its edges were given, "
+        "and no `vertices` without positions"
+    )
     edges: int
     triangulated_polygons: int = Field(
         description="Polygons that became several faces; the array `face_map` leads back to them"
@@ -169,7 +172,10 @@ class MeshDocument(BaseModel):
     non_manifold_edges: Sample
     inconsistent_orientation: bool
     misoriented_edges: Sample
-    bounds: tuple[tuple[float, float, float], tuple[float, float, float]]
+    bounds: tuple[tuple[float, float, float], tuple[float, float, float]] | None = Field(
+        description="Lowest and highest corner of the bounding box; null for a mesh that is given "
+        "by the lengths of its edges alone"
+    )
     mean_edge_length: float
 
 

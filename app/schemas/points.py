@@ -189,7 +189,20 @@ Source = Annotated[
 """A point or a curve where distances start, at ``start_distance``."""
 
 _LIST_TAG, _NAME_TAG = "as a list", "as a name"
-TAGS = frozenset({BARE_TAG, *POINT_TAGS.values(), _LIST_TAG, _NAME_TAG})
+_POINT_TAG, _VECTOR_TAG = "as a point", "as a vector"
+_ANGLES_TAG, _VECTORS_TAG = "as angles", "as vectors"
+TAGS = frozenset(
+    {
+        BARE_TAG,
+        *POINT_TAGS.values(),
+        _LIST_TAG,
+        _NAME_TAG,
+        _POINT_TAG,
+        _VECTOR_TAG,
+        _ANGLES_TAG,
+        _VECTORS_TAG,
+    }
+)
 """All tags: they come in the places of faults, and are no members"""
 
 
@@ -203,3 +216,27 @@ Ends = Annotated[
     Discriminator(_tag_of_ends),
 ]
 """The points on one side of a matrix, or all vertices."""
+
+
+def _tag_of_axis(value: Any) -> str:
+    return _VECTOR_TAG if isinstance(value, list | tuple) else _POINT_TAG
+
+
+Axis = Annotated[
+    Annotated[Triple, Tag(_VECTOR_TAG)] | Annotated[Point, Tag(_POINT_TAG)],
+    Discriminator(_tag_of_axis),
+]
+"""A direction at a point: a vector in space, or a point of the surface to look at."""
+
+
+def _tag_of_directions(value: Any) -> str:
+    first = value[0] if isinstance(value, list) and value else None
+    return _VECTORS_TAG if isinstance(first, list | tuple) else _ANGLES_TAG
+
+
+Directions = Annotated[
+    Annotated[FailFastList[Number], Field(min_length=1), Tag(_ANGLES_TAG)]
+    | Annotated[FailFastList[Triple], Field(min_length=1), Tag(_VECTORS_TAG)],
+    Discriminator(_tag_of_directions),
+]
+"""Directions at some points: angles, radians, or vectors in space."""

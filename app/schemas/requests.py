@@ -7,6 +7,7 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    StrictBool,
     StrictInt,
     model_validator,
 )
@@ -14,10 +15,13 @@ from pydantic_core import PydanticCustomError
 
 from app.schemas.points import (
     MOST_MEMBERS,
+    Axis,
     Count,
+    Directions,
     Ends,
     FailFastList,
     NonNegative,
+    Number,
     Point,
     PointOrCurve,
     Positive,
@@ -102,6 +106,16 @@ class AmongBarriers(QueryBody):
     )
 
 
+class AskingForLines(AmongBarriers):
+    """A query for lines on the surface."""
+
+    include: FailFastList[Literal["locations"]] = Field(
+        default=[],
+        description="`locations`: also the points of lines as faces and weights. On a mesh without "
+        "positions they come in any case",
+    )
+
+
 class DistancesRequest(AccuracyOrEffort, AmongBarriers):
     """Distances from the nearest of ``sources`` to all vertices, or to ``targets`` only."""
 
@@ -130,14 +144,18 @@ class DistancesRequest(AccuracyOrEffort, AmongBarriers):
     )
 
 
-class IsolinesRequest(Accuracy, AmongBarriers):
-    """Lines of equal distance from the nearest of ``sources``: at ``levels``, or at ``count``."""
+class IsolinesRequest(Accuracy, AskingForLines):
+    """Lines of equal distance from the nearest of ``sources``, or of equal ``values``.
+
+    They are drawn at ``levels``, or at ``count`` of them.
+    """
 
     model_config = ConfigDict(
         json_schema_extra={
             "examples": [
                 {"sources": [{"vertex": 0}], "count": 10},
                 {"sources": [{"vertex": 0}, {"vertex": 7}], "levels": [0.5, 1.0]},
+                {"values": [0.5, -1.0, None, 2.0], "levels": [0.0]},
             ]
         }
     )
@@ -146,14 +164,24 @@ class IsolinesRequest(Accuracy, AmongBarriers):
         default="exact",
         description="`fast` is not available: lines need windows, which it does not have",
     )
-    sources: FailFastList[Source] = Field(min_length=1)
-    levels: FailFastList[Positive] | None = Field(
-        default=None, min_length=1, description="Distances in mesh units; give these or `count`"
+    sources: FailFastList[Source] = Field(
+        default=[], description="Where distances start, at least one; give these or `values`"
+    )
+    values: FailFastList[Number | None] | None = Field(
+        default=None,
+        description="A number for each vertex, linear on each face, or `null` where there is none. "
+        "Goes without `sources` and all that is about distances: `method` with its errors, "
+        "`max_distance` and `chord_error`. Lines have the higher values on their left",
+    )
+    levels: FailFastList[Number] | None = Field(
+        default=None,
+        min_length=1,
+        description="Distances in mesh units, greater than 0, or any values; give these or `count`",
     )
     count: Count | None = Field(
         default=None,
         description="Number of levels, evenly spaced between 0 and the largest distance of a "
-        "reachable vertex, both left out",
+        "reachable vertex, or between the lowest and the highest of `values`, both left out",
     )
     max_distance: NonNegative | None = Field(
         default=None, description="There are no lines at levels above this"
@@ -166,7 +194,7 @@ class IsolinesRequest(Accuracy, AmongBarriers):
     )
 
 
-class BordersRequest(AmongBarriers):
+class BordersRequest(AskingForLines):
     """The borders of the territories of ``sources``; always exact."""
 
     model_config = ConfigDict(
@@ -183,6 +211,12 @@ class BordersRequest(AmongBarriers):
         "mostly hyperbolas inside faces, in mesh units. At least a billionth of the bounding box's "
         "diagonal; a thousandth of the mean edge length if not given",
     )
+
+
+class BoundariesRequest(AskingForLines):
+    """The boundary of the surface. Blocked faces are no part of it: their rim is a boundary."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{}]})
 
 
 class Stops(AmongBarriers):
@@ -280,6 +314,61 @@ class NearestRequest(AmongBarriers):
     k: Count = Field(default=1, description="Number of candidates to find, at most all of them")
     max_distance: NonNegative | None = Field(
         default=None, description="Candidates farther than this are left out"
+    )
+
+
+class LogMapRequest(AmongBarriers):
+    """How far all vertices are from ``source``, and in which direction; always exact."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {"source": {"vertex": 0}},
+                {"source": {"vertex": 0}, "x_axis": {"vertex": 7}, "max_distance": 2.0},
+            ]
+        }
+    )
+
+    source: Point
+    x_axis: Axis | None = Field(
+        default=None,
+        description="From where angles are measured: a point to look at, by its shortest path, or "
+        "a vector in space, which is projected to the surface. If not given: the edge that leaves "
+        "a vertex in its lowest face, from corner 0 to corner 1 of the lowest face for other "
+        "points, and where the surface begins at a boundary",
+    )
+    rescale: StrictBool = Field(
+        default=True,
+        description="Whether `coordinates` stretch or shrink the angles around the source to a "
+        "full turn",
+    )
+    max_distance: NonNegative | None = Field(
+        default=None, description="Vertices farther than this, in mesh units, count as unreachable"
+    )
+
+
+class TraceRequest(AmongBarriers):
+    """Straightest lines from ``starts``. Each list has one item for all lines, or one for each."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {"starts": [{"vertex": 0}], "directions": [0.0, 1.5], "lengths": [2.0]},
+                {"starts": [{"vertex": 0}], "directions": [[1.0, 0.0, 0.0]], "lengths": [2.0]},
+            ]
+        }
+    )
+
+    starts: FailFastList[Point] = Field(min_length=1)
+    directions: Directions = Field(
+        description="Angles, in radians, counter-clockwise from where those of a log map begin; or "
+        "vectors in space, which are projected to the surface"
+    )
+    lengths: FailFastList[NonNegative] = Field(min_length=1, description="Lengths in mesh units")
+    at_vertices: Literal["straight", "stop"] = Field(
+        default="straight",
+        description="`straight`: on through vertices, with equal angles on both sides; `stop`: to "
+        "the first vertex",
     )
 
 

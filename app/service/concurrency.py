@@ -1,12 +1,11 @@
 """Concurrency of each caller: how much it may do at the same time."""
 
 from collections import Counter
-from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager, contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from app.access import Caller
-from app.errors import ProblemError, over_limit
-from app.state import Allowances
+from app.errors import over_limit
 
 
 class ConcurrencyLimit:
@@ -37,7 +36,8 @@ class ConcurrencyLimit:
         name = caller.name
         running = self._running[name] + 1
         if self._limit is not None and running > self._limit:
-            raise self._refusal(running, self._limit)
+            what, headers = f"{self._what} at the same time", {"Retry-After": "1"}
+            raise over_limit(self._code, what, running, self._limit, self._setting, headers=headers)
         self._running[name] = running
         try:
             yield
@@ -45,18 +45,3 @@ class ConcurrencyLimit:
             self._running[name] -= 1
             if not self._running[name]:
                 del self._running[name]
-
-    @asynccontextmanager
-    async def counting_for_all(self, caller: Caller, allowances: Allowances) -> AsyncIterator[None]:
-        """Count the block in what all replicas count, or refuse it with a problem."""
-        if self._limit is None:
-            yield
-            return
-        async with allowances.counting(self._setting, caller.name, self._limit) as running:
-            if running > self._limit:
-                raise self._refusal(running, self._limit)
-            yield
-
-    def _refusal(self, running: int, limit: int) -> ProblemError:
-        what, headers = f"{self._what} at the same time", {"Retry-After": "1"}
-        return over_limit(self._code, what, running, limit, self._setting, headers=headers)

@@ -2,7 +2,7 @@
 
 import shutil
 from collections import Counter
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from app.errors import ProblemError
-from app.jobs import Job, read_jobs, read_shared_jobs
+from app.jobs import Job, read_jobs
 from app.settings import variable_of
-from app.state import StateError, require_intact
+from app.state import Database, StateError, require_intact
 from app.store.fields import code_of_field, field_files
 from app.store.folder import Folder
 from app.store.layout import (
@@ -35,9 +35,8 @@ class MeshEntry:
 
     id: str
     faces: int | None
-    """None where its manifest is damaged, as for the next three"""
+    """None where its manifest is damaged, as for the next two"""
     created: str | None
-    owner: str | None
     name: str | None
     bytes: int
     last_used: datetime
@@ -57,9 +56,8 @@ class Contents:
 
 @dataclass(frozen=True)
 class Leftover:
-    """Files that nothing needs any more, and why."""
+    """Files that nothing needs any more."""
 
-    reason: str
     paths: tuple[Path, ...]
 
     @property
@@ -86,7 +84,8 @@ def jobs_of(root: Path, state: str | None) -> list[Job]:
     StoreError
         The store's own database is damaged.
     """
-    jobs, service = read_jobs(root / JOB_DATABASE), noted_state(root)
+    path, service = root / JOB_DATABASE, noted_state(root)
+    jobs = read_jobs(Database(path))
     if state is None:
         if service is not None:
             raise StateError(
@@ -94,8 +93,9 @@ def jobs_of(root: Path, state: str | None) -> list[Job]:
                 f"database as --state or {variable_of('state')}, since it holds their jobs"
             )
         return jobs
-    name, shared_jobs = read_shared_jobs(state)
-    if service not in (None, name):
+    shared = Database(path, state)
+    shared_jobs = read_jobs(shared)
+    if service not in (None, shared.service):
         raise StateError(
             f"the services of the store {root} share another database than the given one"
         )
@@ -126,7 +126,6 @@ def _mesh_entry(root: Path, mesh_id: str, size: int, modified: float) -> MeshEnt
         mesh_id,
         manifest.get("report", {}).get("faces"),
         manifest.get("created"),
-        manifest.get("owner"),
         manifest.get("name"),
         size,
         datetime.fromtimestamp(modified, UTC),
@@ -169,26 +168,24 @@ def leftovers(root: Path, code: str, jobs: Iterable[Job]) -> Iterator[Leftover]:
     Yields
     ------
     Leftover
-        The files of one reason. The result of a job is none, unless it is damaged.
+        Files that go together. The result of a job is none, unless it is damaged.
     """
     meshes, of_jobs = set(MeshStore(root).ids()), {job.result for job in jobs}
     results, fields, files = _complete_results(root), field_files(root), ResultFiles(Folder(root))
     for name, paths in results.items():
         found = files.read_now(name)
-        if found is None or name not in of_jobs:
-            written_by = None if found is None else found.manifest.code
-            reason = _reason(name, written_by, meshes, code)
-            if reason is not None:
-                yield Leftover(reason, paths)
+        if found is not None and name in of_jobs:
+            continue
+        if found is None or found.manifest.code != code or paths[0].parent.name not in meshes:
+            yield Leftover(paths)
     for path in fields:
-        reason = _reason(_field_name(path), code_of_field(path), meshes, code)
-        if reason is not None:
-            yield Leftover(reason, (path,))
+        if code_of_field(path) != code or path.parent.name not in meshes:
+            yield Leftover((path,))
     complete = {*fields, *(path for paths in results.values() for path in paths)}
     folders = (root / TEMPORARY, *(root / RESULTS).glob("*"), *(root / FIELDS).glob("*"))
     for path in (path for folder in folders for path in folder.glob("*")):
         if path not in complete:
-            yield Leftover("half-written", (path,))
+            yield Leftover((path,))
 
 
 def _complete_results(root: Path) -> dict[str, tuple[Path, Path]]:
@@ -203,15 +200,6 @@ def _complete_results(root: Path) -> dict[str, tuple[Path, Path]]:
 
 def _field_name(path: Path) -> str:
     return f"{path.parent.name}/{path.stem}"
-
-
-def _reason(name: str, written_by: str | None, meshes: Container[str], code: str) -> str | None:
-    """Return why a result or a field can be removed, if it can; no code wrote a damaged one."""
-    if written_by is None:
-        return "damaged"
-    if name.partition("/")[0] not in meshes:
-        return "of a mesh that is gone"
-    return "outdated" if written_by != code else None
 
 
 def remove(leftover: Leftover) -> None:

@@ -54,7 +54,7 @@ class QueryJobs:
         """Accept a job that answers a query, or return the job with the idempotency key."""
         query.check_answer(self._settings, as_job=True)
         self._answering.engine.refuse_when_full(context.caller.name)
-        self._results.refuse_without_room(context.caller.owner, self._room(query))
+        self._results.refuse_without_room(context.caller.name, self._room(query))
 
         return await self._jobs.submit(_spec_of(query, context, key), query.written)
 
@@ -79,7 +79,7 @@ class QueryJobs:
         try:
             await asyncio.wait({answering}, timeout=min(wait_s, context.deadline_s))
             if not answering.done():
-                self._results.refuse_without_room(context.caller.owner, self._room(query))
+                self._results.refuse_without_room(context.caller.name, self._room(query))
                 job = await self._jobs.submit(_spec_of(query, context, key), query.written)
                 handing_over = asyncio.create_task(self._hand_over(answering, job))
                 self._handing_over.add(handing_over)
@@ -121,7 +121,7 @@ class QueryJobs:
                     self._stored_query, spec, size, written, limiter=self._reading
                 )
                 query = query.answered_as(representation)
-                return await self._promised(query, spec.client, spec.owner, on_progress)
+                return await self._promised(query, spec.client, on_progress)
 
         return await self._patiently(attempt)
 
@@ -138,10 +138,10 @@ class QueryJobs:
                 await asyncio.sleep(_STORE_PAUSE_S)
 
     async def _promised(
-        self, query: Query[Any], client: str, owner: str | None, on_progress: ProgressCallback
+        self, query: Query[Any], client: str, on_progress: ProgressCallback
     ) -> Result:
         """Answer the query of a job, with files, for which room is reserved before."""
-        with self._results.reserving(owner, self._room(query)):
+        with self._results.reserving(client, self._room(query)):
             result, _ = await self._answering.find_or_compute(
                 query, client, on_progress, is_promised=True
             )
@@ -167,7 +167,6 @@ class QueryJobs:
 def _spec_of(query: Query[Any], context: RequestContext, key: str | None) -> JobSpec:
     representation = query.representation
     return JobSpec(
-        owner=context.caller.owner,
         kind=query.kind,
         mesh_id=query.mesh_id,
         media_type=representation.media_type,

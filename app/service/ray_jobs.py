@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, Protocol
 
 from app import logs
-from app.jobs import JobRunner
+from app.jobs import Job, JobRunner
 from app.settings import Settings
 
 
@@ -65,6 +65,10 @@ class RemoteRunner:
         }
         process: Any = ray.remote(JobsProcess)
         self._process = process.options(**options).remote(service_of, settings)
+
+    def start(self, _job: Job, _query: bytes) -> None:
+        """Have that process look for the job, see ``Runner``."""
+        self.nudge()
 
     def nudge(self) -> None:
         """See ``Runner``."""

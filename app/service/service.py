@@ -11,11 +11,9 @@ from typing import Any
 
 from anyio import to_thread
 
-from app.access import Caller
 from app.engine.interface import Engine
 from app.engine.supplied import SuppliedEngine
 from app.engine.work import MeshInput, StoreMesh, Task
-from app.errors import ProblemError, problem
 from app.jobs import JobManager, JobRepository, JobRunner, Retention
 from app.queries import MeshSize
 from app.repeating import repeat
@@ -27,11 +25,11 @@ from app.service.request_context import RequestContext
 from app.service.resources import share_arenas
 from app.service.time_limit import time_limit
 from app.settings import Settings
-from app.state import Allowances, Database, MeshRecords, database_of
+from app.state import Database
 from app.store import layout
 from app.store.choice import store_of
 from app.store.fields import FieldStore
-from app.store.mesh_catalog import MeshCatalog
+from app.store.mesh_catalog import MeshCatalog, MeshTables
 from app.store.mesh_index import MeshIndex
 from app.store.ownership import Share
 from app.store.results import ResultStore
@@ -70,8 +68,7 @@ class Service:
             self.store.meshes,
             settings.store_bytes,
             evicts=settings.store_evict == "lru",
-            quota=settings.quota_bytes,
-            shared=MeshRecords(self.database) if self.database.is_shared else None,
+            shared=_mesh_records(self.database),
         )
         self.mesh_index = MeshIndex(self.store.meshes)
         self.results = ResultStore(
@@ -83,13 +80,9 @@ class Service:
         self.fields = FieldStore(settings.folder, settings.fields_bytes)
         self.engine = _engine(settings, self.store)
         self.engine.on_unclaimed = self.results.index_unclaimed
-        self.allowances = (
-            Allowances(self.database, settings.deadline_s) if self.database.is_shared else None
-        )
-        """What callers have taken, where several services count together"""
         repository, ttl_s = JobRepository(self.database), settings.job_ttl
         retention = Retention(self.results, ttl_s)
-        self.jobs = JobManager(repository, self.results, retention, settings.quota_jobs)
+        self.jobs = JobManager(repository, self.results, retention)
         self.answering = Answering(
             settings,
             self.mesh_catalog,
@@ -103,7 +96,7 @@ class Service:
         self.job_runner = JobRunner(
             repository, self.results, retention, ttl_s, self.query_jobs.solve, self.jobs.notify
         )
-        self._uploads = ConcurrencyLimit(
+        self.uploads = ConcurrencyLimit(
             settings.quota_uploads, "quota_exceeded", "uploads", "quota_uploads"
         )
         self.is_leaving = False
@@ -119,7 +112,7 @@ class Service:
             self.results.prepare()
             if share.is_first:
                 self.fields.prepare(self.mesh_catalog.ids)
-            async with self._open_database(share):
+            async with self._using_database(share):
                 await self.engine.start()
                 # Objects of the start live for ever; each full collection over them takes 90 ms.
                 collect()
@@ -168,9 +161,8 @@ class Service:
             yield share
 
     @asynccontextmanager
-    async def _open_database(self, share: Share) -> AsyncIterator[None]:
-        """Open the database inside the block; keep the catalogue up with other services there."""
-        await self.database.open()
+    async def _using_database(self, share: Share) -> AsyncIterator[None]:
+        """Use the database inside the block; keep the catalogue up with other services there."""
         following = None
         try:
             if self.database.is_shared:
@@ -186,7 +178,7 @@ class Service:
             if following is not None:
                 following.cancel()
                 await asyncio.wait({following})
-            await self.database.close()
+            await self.database.aclose()
 
     def announce_end(self) -> None:
         """Say that the service is not ready, so that no new clients are sent to it."""
@@ -198,16 +190,6 @@ class Service:
         self.engine.drain()
         self.jobs.end_events()
 
-    @asynccontextmanager
-    async def counting_upload(self, caller: Caller) -> AsyncIterator[None]:
-        """Count the block as an upload of a caller, or refuse it with ``quota_exceeded``."""
-        if self.allowances is None:
-            with self._uploads.counting(caller):
-                yield
-        else:
-            async with self._uploads.counting_for_all(caller, self.allowances):
-                yield
-
     async def add_mesh(
         self, mesh_input: MeshInput, name: str | None, context: RequestContext
     ) -> StoredMesh:
@@ -216,7 +198,7 @@ class Service:
             self.scratch.folder(context.caller.name) as scratch,
             time_limit(self.settings, context.deadline_s),
         ):
-            work = StoreMesh(mesh_input, scratch.path / "mesh", context.caller.owner, name)
+            work = StoreMesh(mesh_input, scratch.path / "mesh", name)
             task = Task(work, context.caller.name)
             while True:
                 done = await self.engine.run(task, ignore_progress)
@@ -246,24 +228,12 @@ class Service:
         report = (await self.store.meshes.manifest(mesh_id))["report"]
         return MeshSize(report["vertices"], report["faces"], report["mean_edge_length"])
 
-    async def delete_mesh(self, mesh_id: str, caller: Caller) -> None:
+    async def delete_mesh(self, mesh_id: str) -> None:
         """Remove a mesh and its results; afterwards no service that shares the store has it."""
-        if not caller.may_delete(await self._owner(mesh_id)):
-            raise problem("forbidden", f"mesh {mesh_id} was stored with another API key")
         await self.mesh_catalog.delete(mesh_id)
         await self._forget(mesh_id)
         if self.database.is_shared:
             await asyncio.sleep(self.store.meshes.trusted_s)
-
-    async def _owner(self, mesh_id: str) -> str | None:
-        """Return the owner of a mesh; None where it has none, or its manifest is damaged."""
-        try:
-            owner: str | None = (await self.store.meshes.manifest(mesh_id))["owner"]
-        except ProblemError as error:
-            if error.problem.code != "mesh_damaged":
-                raise
-            return None
-        return owner
 
     async def _forget(self, mesh_id: str) -> None:
         """Remove results and fields of a mesh that is gone, or that was damaged.
@@ -288,6 +258,15 @@ def _engine(settings: Settings, store: Store) -> Engine:
     return engine if store.supply is None else SuppliedEngine(engine, store.supply)
 
 
+def _mesh_records(database: Database) -> MeshTables | None:
+    """Return the table of meshes that several services share, if there are several."""
+    if not database.is_shared:
+        return None
+    from app.state.mesh_records import MeshRecords  # words of PostgreSQL, a tenth of a second
+
+    return MeshRecords(database)
+
+
 def _database_of(settings: Settings) -> Database:
     url = settings.state.get_secret_value() if settings.state else None
-    return database_of(settings.folder / layout.JOB_DATABASE, url)
+    return Database(settings.folder / layout.JOB_DATABASE, url)

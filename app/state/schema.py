@@ -1,86 +1,81 @@
-"""Tables, in words that SQLite and PostgreSQL share but for the types in braces.
+"""The tables, in SQLite and in PostgreSQL.
 
-Each revision is a list of statements, which may be run again: SQLite runs all when its file is
-opened, and PostgreSQL those that it lacks, by Alembic (`app.state.migrations`). Once released, a
-revision does not change; add another, and a module to the migrations.
+A table changes by a revision in `app.state.migrations.versions`, whose number becomes `HEAD`.
+Databases that are new have the tables from here.
 """
 
-from collections.abc import Mapping, Sequence
+from sqlalchemy import (
+    JSON,
+    BigInteger,
+    Column,
+    Computed,
+    Double,
+    Identity,
+    Index,
+    Integer,
+    LargeBinary,
+    MetaData,
+    String,
+    Table,
+    Text,
+    cast,
+    extract,
+    func,
+)
 
-REVISIONS: Mapping[str, Sequence[str]] = {
-    "0001": (
-        """
-        CREATE TABLE IF NOT EXISTS jobs (
-            number {number},
-            record {json} NOT NULL,
-            id TEXT UNIQUE GENERATED ALWAYS AS (record ->> 'id') {computed},
-            owner TEXT GENERATED ALWAYS AS (record -> 'errand' ->> 'owner') {computed},
-            idempotency_key TEXT
-                GENERATED ALWAYS AS (record -> 'errand' ->> 'idempotency_key') {computed},
-            status TEXT GENERATED ALWAYS AS (record ->> 'status') {computed},
-            finished TEXT GENERATED ALWAYS AS (record ->> 'finished') {computed}
-        )
-        """,
-        # What has no owner has none in the record; COALESCE, since only SQLite finds NULL by index.
-        "CREATE INDEX IF NOT EXISTS jobs_of_owner ON jobs (COALESCE(owner, ''), number)",
-        """
-        CREATE INDEX IF NOT EXISTS jobs_of_key ON jobs (COALESCE(owner, ''), idempotency_key)
-            WHERE idempotency_key IS NOT NULL
-        """,
-        "DROP INDEX IF EXISTS jobs_by_owner",  # of earlier releases, as the next
-        "DROP INDEX IF EXISTS jobs_by_key",
-        "CREATE INDEX IF NOT EXISTS jobs_by_end ON jobs (finished)",
-        # Queries have a table of their own, since they may be large, and records change often.
-        "CREATE TABLE IF NOT EXISTS queries (job_id TEXT PRIMARY KEY, query {bytes} NOT NULL)",
-        "CREATE TABLE IF NOT EXISTS replicas (id TEXT PRIMARY KEY, beats BIGINT NOT NULL)",
-        """
-        CREATE TABLE IF NOT EXISTS meshes (
-            id TEXT PRIMARY KEY,
-            size BIGINT NOT NULL,
-            owner TEXT,
-            used DOUBLE PRECISION NOT NULL,
-            pinned DOUBLE PRECISION NOT NULL
-        )
-        """,
-        "CREATE TABLE IF NOT EXISTS rates (caller TEXT PRIMARY KEY, due DOUBLE PRECISION NOT NULL)",
-        """
-        CREATE TABLE IF NOT EXISTS running (
-            replica TEXT NOT NULL,
-            kind TEXT NOT NULL,
-            caller TEXT NOT NULL,
-            count BIGINT NOT NULL,
-            PRIMARY KEY (replica, kind, caller)
-        )
-        """,
+HEAD = "0004"
+"""The last revision"""
+BEFORE_ALEMBIC = "0002"
+"""The revision of files of SQLite that have no number of theirs"""
+
+metadata = MetaData()
+
+
+def _computed(name: str, expression: str, *, unique: bool | None = None) -> Column[str]:
+    """Return a column of text that the database computes from the record of a job."""
+    return Column(name, Text, Computed(expression, persisted=True), unique=unique)
+
+
+jobs = Table(
+    "jobs",
+    metadata,
+    Column(
+        "number",
+        BigInteger().with_variant(Integer, "sqlite"),
+        Identity(always=True),
+        primary_key=True,
     ),
-    "0002": (
-        "DROP TABLE IF EXISTS replicas",
-        "DROP TABLE IF EXISTS running",
-        """
-        CREATE TABLE IF NOT EXISTS work (
-            id TEXT PRIMARY KEY,
-            kind TEXT NOT NULL,
-            caller TEXT NOT NULL,
-            ends DOUBLE PRECISION NOT NULL
-        )
-        """,
-    ),
-}
+    Column("record", JSON, nullable=False),
+    _computed("id", "record ->> 'id'", unique=True),
+    _computed("idempotency_key", "record -> 'errand' ->> 'idempotency_key'"),
+    _computed("status", "record ->> 'status'"),
+    _computed("finished", "record ->> 'finished'"),
+    Index("jobs_by_key", "idempotency_key"),
+    Index("jobs_by_end", "finished"),
+    sqlite_autoincrement=True,  # numbers of removed jobs do not come again
+)
 
-SQLITE = {
-    "number": "INTEGER PRIMARY KEY AUTOINCREMENT",
-    "json": "TEXT",
-    "bytes": "BLOB",
-    "computed": "VIRTUAL",
-}
-POSTGRESQL = {
-    "number": "BIGINT GENERATED ALWAYS AS IDENTITY PRIMARY KEY",
-    "json": "JSON",
-    "bytes": "BYTEA",
-    "computed": "STORED",
-}
+queries = Table(  # apart from jobs, since they may be large, and records change often
+    "queries",
+    metadata,
+    Column("job_id", Text, primary_key=True),
+    Column("query", LargeBinary, nullable=False),
+)
 
+# The next is used only where several services share PostgreSQL.
 
-def statements(revision: str, words: Mapping[str, str]) -> list[str]:
-    """Return the statements of a revision in the ``words`` of a database."""
-    return [statement.format(**words) for statement in REVISIONS[revision]]
+CLOCK = cast(extract("epoch", func.clock_timestamp()), Double)
+"""The seconds since 1970 by the clock of the database"""
+
+meshes = Table(
+    "meshes",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("size", BigInteger, nullable=False),
+    Column("used", Double, nullable=False),
+    Column("pinned", Double, nullable=False),
+)
+
+revision = Table(  # Alembic's own
+    "alembic_version", metadata, Column("version_num", String(32), primary_key=True)
+)

@@ -8,10 +8,9 @@
         meshes/         see ``app.store.meshes``
         results/        see ``app.store.results``
         fields/         see ``app.store.fields``
-        jobs.sqlite3    see ``app.state.sqlite``
+        jobs.sqlite3    see ``app.state.schema``
         state           names the shared database that has the jobs instead, if any
         identity        a random id, by which machines tell this store from others
-        jobs.reserve    see ``app.store.reserve``
         tmp/            meshes that are being written
 """
 
@@ -26,7 +25,7 @@ LAYOUT = 7
 including the tables of jobs."""
 
 STATE, IDENTITY = "state", "identity"
-JOB_DATABASE, JOB_RESERVE = "jobs.sqlite3", "jobs.reserve"
+JOB_DATABASE = "jobs.sqlite3"
 MESHES, RESULTS, FIELDS = "meshes", "results", "fields"
 TEMPORARY = "tmp"
 

@@ -1,4 +1,4 @@
-"""The catalog of stored meshes: sizes, owners and order of use.
+"""The catalog of stored meshes: sizes and order of use.
 
 One process knows it, or the catalogs of several services share a table. Their home is the source of
 truth: a folder, or an object store. Each change there is made together with its entry here: a crash
@@ -53,10 +53,10 @@ class MeshTables(Protocol):
 
 
 class MeshCatalog:
-    """The meshes of a store, at most ``capacity`` bytes, and of one owner at most ``quota``.
+    """The meshes of a store, at most ``capacity`` bytes.
 
     A mesh that finds no room is refused. With ``evicts``, the least recently used meshes are
-    removed instead, but none that is pinned. None is removed to make room in a quota.
+    removed instead, but none that is pinned.
 
     Where services share the meshes, ``shared`` is their table. What is here is a copy of it, as old
     as the last change or `keep_up`.
@@ -68,7 +68,6 @@ class MeshCatalog:
         capacity: int,
         *,
         evicts: bool,
-        quota: int | None = None,
         shared: MeshTables | None = None,
     ) -> None:
         self._home = home
@@ -78,7 +77,6 @@ class MeshCatalog:
         """Meshes used since the shared table was told, the last one last"""
         self._capacity = capacity
         self._evicts = evicts
-        self._quota = quota
         self._entries: OrderedDict[str, MeshRecord] = OrderedDict()  # the least recently used first
         self._pins: Counter[str] = Counter()
         self.evictions = 0
@@ -162,7 +160,7 @@ class MeshCatalog:
         Raises
         ------
         ProblemError
-            There is no room, or none in the owner's quota.
+            There is no room.
         """
         mesh_id = written.mesh_id
         if written.folder is None:
@@ -187,9 +185,7 @@ class MeshCatalog:
             if change is not None:
                 return change
         is_new = mesh_id not in self._entries
-        entry = MeshRecord(written.size, written.manifest["owner"])
-        if is_new:  # one that is healed has its room already
-            self._refuse_over_quota(entry)
+        entry = MeshRecord(written.size)
         evicted = self._choose_evicted(mesh_id, entry.size)
         for old in evicted:
             await self._remove(old)
@@ -237,23 +233,6 @@ class MeshCatalog:
             self._pins[mesh_id] -= 1
             if not self._pins[mesh_id]:
                 del self._pins[mesh_id]
-
-    def _refuse_over_quota(self, new: MeshRecord) -> None:
-        """Raise where its owner's quota has no room for a new mesh."""
-        if self._quota is None:
-            return
-        own = [entry.size for entry in self._entries.values() if entry.owner == new.owner]
-        total = sum(own) + new.size
-        if total > self._quota:
-            raise over_limit(
-                "quota_exceeded",
-                "bytes of meshes of one owner",
-                total,
-                self._quota,
-                "quota_bytes",
-                hint="delete meshes of yours that you no longer need",
-                other_status=507,
-            )
 
     def _choose_evicted(self, mesh_id: str, size: int) -> list[str]:
         """Return the meshes to evict for one of ``size`` bytes; raise where that is not enough."""

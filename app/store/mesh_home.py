@@ -19,6 +19,7 @@ from app.store.meshes import (
     WrittenMesh,
     decode_manifest,
     mesh_not_found,
+    public_arrays,
     require_id,
 )
 from app.store.objects import ObjectInfo, Objects
@@ -36,7 +37,6 @@ class MeshRecord(NamedTuple):
 
     size: int
     """Bytes of its files"""
-    owner: str | None
     is_pinned: bool = False
     """Whether a service that shares the table needs it at the moment"""
 
@@ -164,10 +164,7 @@ class MeshHome:
                 sizes[mesh_id] += each.size
             elif removes and each.is_abandoned:
                 self._objects.remove(each.name)
-        return {
-            mesh_id: MeshRecord(sizes[mesh_id], manifest["owner"] if manifest else None)
-            for mesh_id, manifest in manifests.items()
-        }
+        return {mesh_id: MeshRecord(sizes[mesh_id]) for mesh_id in manifests}
 
     def _read_all(self, ids: Iterable[str]) -> Sequence[Mapping[str, Any] | None]:
         with ThreadPoolExecutor(_CALLS) as pool:
@@ -228,8 +225,16 @@ def _stored_name(manifest: Mapping[str, Any], name: str) -> str:
     if name not in PUBLIC_ARRAYS:
         detail = f"there is no array {name!r}; the arrays are {', '.join(PUBLIC_ARRAYS)}"
         raise problem("not_found", detail)
-    if PUBLIC_ARRAYS[name] not in manifest["crc32"]:
-        # TriangleMesh has no map where it is the identity.
-        unchanged = "vertices" if name == "vertex_map" else "faces"
-        raise problem("not_found", f"the mesh has no {name}: it keeps the {unchanged} of its file")
-    return PUBLIC_ARRAYS[name]
+    stored = public_arrays(manifest).get(name)
+    if stored is None:
+        raise problem("not_found", f"the mesh has no {name}: {_ABSENT[name]}")
+    return stored
+
+
+_ABSENT = {
+    "vertices": "it is given by the lengths of its edges",
+    "lengths": "they are the distances of its vertices",
+    "vertex_map": "it keeps the vertices of its file",  # TriangleMesh has no map that moves nothing
+    "face_map": "it keeps the faces of its file",
+}
+"""Why a mesh has no array of a name"""

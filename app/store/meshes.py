@@ -2,7 +2,7 @@
 
 ::
 
-    meshes/{id}/manifest.json      report, warnings, owner, name, and the checksum of each array
+    meshes/{id}/manifest.json      report, warnings, name, and the checksum of each array
     meshes/{id}/{array}.npy        one file for each array of ``TriangleMesh.arrays()``
 
 The id is a hash of the canonical arrays (vertices, faces, both maps), not of the uploaded bytes. So
@@ -48,6 +48,7 @@ FileVersion = tuple[int, int]
 PUBLIC_ARRAYS = {
     "vertices": "vertices",
     "faces": "faces",
+    "lengths": "lengths",
     "vertex_map": "vertex_map",
     "face_map": "face_map",
     "components": "component",
@@ -121,15 +122,13 @@ class MeshStore:
         self,
         mesh: TriangleMesh,
         folder: Path,
-        owner: str | None,
         name: str | None = None,
         check: Callable[[], None] = lambda: None,
     ) -> WrittenMesh:
         """Write ``mesh`` into a new scratch ``folder``, unless it is intact in the store.
 
-        The files survive a power cut. A mesh in the store belongs to the ``owner`` that stored it
-        first, and keeps the ``name`` that it got then, as far as its manifest still tells. Before
-        each array ``check`` is called; it may raise.
+        The files survive a power cut. A mesh in the store keeps the ``name`` that it got first, as
+        far as its manifest still tells. Before each array ``check`` is called; it may raise.
         """
         arrays = mesh.arrays()
         mesh_id = content_hash(arrays)
@@ -145,7 +144,6 @@ class MeshStore:
             checksums[array_name] = _write_array(folder / f"{array_name}.npy", array)
         manifest = {
             "id": mesh_id,
-            "owner": owner,
             "name": name,
             "created": datetime.now(UTC).isoformat(timespec="milliseconds"),
             "report": mesh.report.as_dict(),
@@ -153,7 +151,7 @@ class MeshStore:
             "crc32": checksums,
         }
         if stored:
-            manifest |= {key: stored.get(key) for key in ("owner", "name", "created")}
+            manifest |= {key: stored.get(key) for key in ("name", "created")}
         (folder / MANIFEST).write_bytes(encode_manifest(manifest))
         sync_all(folder)
         size = sum(path.stat().st_size for path in folder.iterdir())
@@ -251,6 +249,19 @@ class MeshStore:
         except OSError:  # the disk has no room for another name
             gone = self.folder / mesh_id
         shutil.rmtree(gone, ignore_errors=True)
+
+
+def public_arrays(manifest: Mapping[str, Any]) -> Mapping[str, str]:
+    """Return the arrays of a mesh that clients may read, and the names of their files.
+
+    A mesh that is given by lengths alone has no vertices.
+    """
+    absent = ["vertices"] if manifest["report"]["bounds"] is None else []
+    return {
+        name: stored
+        for name, stored in PUBLIC_ARRAYS.items()
+        if stored in manifest["crc32"] and name not in absent
+    }
 
 
 def encode_manifest(manifest: Mapping[str, Any]) -> bytes:

@@ -278,7 +278,7 @@ class ResultFiles:
 class ResultStore:
     """Results in ``files``, at most ``capacity`` bytes; the least recently used go first.
 
-    Those that the jobs of one owner pin, or reserve room for, have at most ``quota`` bytes. In
+    Those that the jobs of one caller pin, or reserve room for, have at most ``quota`` bytes. In
     memory are those used last, of up to ``memory`` bytes: small ones, with files or without, and of
     large ones that they have been verified. One process owns the store and its index. `find` and
     `add` acquire a result, which protects its files until `release`; a pinned one stays until
@@ -295,10 +295,10 @@ class ResultStore:
         self._sizes: OrderedDict[str, int] = OrderedDict()
         self._total = 0
         self._in_use: Counter[str] = Counter()
-        self._pins: defaultdict[str | None, Counter[str]] = defaultdict(Counter)
-        """Numbers of pins on results, by owner"""
-        self._reserved: Counter[str | None] = Counter()
-        """Bytes by owner"""
+        self._pins: defaultdict[str, Counter[str]] = defaultdict(Counter)
+        """Numbers of pins on results, by caller"""
+        self._reserved: Counter[str] = Counter()
+        """Bytes by caller"""
         self.evictions = 0
         """Results removed so far to make room on the disk"""
 
@@ -385,8 +385,8 @@ class ResultStore:
         return filed
 
     @contextmanager
-    def reserving(self, owner: str | None, nbytes: int) -> Iterator[Callable[[int], None]]:
-        """Reserve room for results that an owner's job makes inside the block.
+    def reserving(self, client: str, nbytes: int) -> Iterator[Callable[[int], None]]:
+        """Reserve room for results that a caller's job makes inside the block.
 
         Yields a function that reserves more. Raises ``ProblemError`` where the results of jobs,
         and other reservations, leave too little.
@@ -395,25 +395,25 @@ class ResultStore:
 
         def reserve(nbytes: int) -> None:
             nonlocal reserved
-            self.refuse_without_room(owner, nbytes)
-            self._reserved[owner] += nbytes
+            self.refuse_without_room(client, nbytes)
+            self._reserved[client] += nbytes
             reserved += nbytes
 
         reserve(nbytes)
         try:
             yield reserve
         finally:
-            self._reserved[owner] -= reserved
-            if not self._reserved[owner]:
-                del self._reserved[owner]
+            self._reserved[client] -= reserved
+            if not self._reserved[client]:
+                del self._reserved[client]
 
-    def refuse_without_room(self, owner: str | None, nbytes: int) -> None:
-        """Raise ``ProblemError`` where so many bytes would be too many, of the owner or of all."""
-        own = self._reserved[owner] + self._bytes_of(set(self._pins[owner])) + nbytes
+    def refuse_without_room(self, client: str, nbytes: int) -> None:
+        """Raise ``ProblemError`` where so many bytes would be too many, of the caller or of all."""
+        own = self._reserved[client] + self._bytes_of(set(self._pins[client])) + nbytes
         if self._quota is not None and own > self._quota:
             raise over_limit(
                 "quota_exceeded",
-                "bytes of answers to one owner's jobs",
+                "bytes of answers to one caller's jobs",
                 own,
                 self._quota,
                 "quota_results_bytes",
@@ -439,19 +439,20 @@ class ResultStore:
     def _bytes_of(self, names: set[str]) -> int:
         return sum(self._sizes.get(name, 0) for name in names)
 
-    def pin_within_quota(self, name: str, owner: str | None) -> None:
+    def pin_within_quota(self, name: str, client: str) -> None:
         """Pin a result, or raise ``ProblemError`` as `refuse_without_room` does."""
-        if name not in self._pins[owner]:
-            self.refuse_without_room(owner, 0 if name in self._pinned else self._sizes.get(name, 0))
-        self.pin(name, owner)
+        if name not in self._pins[client]:
+            nbytes = 0 if name in self._pinned else self._sizes.get(name, 0)
+            self.refuse_without_room(client, nbytes)
+        self.pin(name, client)
 
-    def pin(self, name: str, owner: str | None) -> None:
+    def pin(self, name: str, client: str) -> None:
         """Protect a result from eviction until `unpin`."""
-        self._pins[owner][name] += 1
+        self._pins[client][name] += 1
 
-    def unpin(self, name: str, owner: str | None) -> None:
-        """Take one pin of an owner off a result."""
-        self._pins[owner] -= Counter([name])
+    def unpin(self, name: str, client: str) -> None:
+        """Take one pin of a caller off a result."""
+        self._pins[client] -= Counter([name])
         self.make_room()
 
     def discard(self, name: str) -> None:

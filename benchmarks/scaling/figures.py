@@ -129,7 +129,7 @@ def _opening(mesh: gc.TriangleMesh) -> float:
         for run in range(5):
             store = MeshStore(Path(folder, str(run)))
             store.folder.parent.mkdir()
-            written = store.write_aside(mesh, Path(folder, f"{run} aside"), None)
+            written = store.write_aside(mesh, Path(folder, f"{run} aside"))
             assert written.folder is not None, "it is new"  # noqa: S101
             store.install(written.mesh_id, written.folder)
             times.append(spent(partial(store.open, written.mesh_id), runs=1))
@@ -164,7 +164,7 @@ class _Table:
 def _records() -> tuple[float, float]:
     """Return the seconds and the bytes of a record."""
     tracemalloc.start()
-    records = {f"{i:032x}": MeshRecord(i, None) for i in range(RECORDS)}
+    records = {f"{i:032x}": MeshRecord(i) for i in range(RECORDS)}
     size = tracemalloc.get_traced_memory()[0]
     tracemalloc.stop()
     with tempfile.TemporaryDirectory() as folder:

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 
 SECRETS = {name: f"{name}-0123456789abcdef" for name in ("alice", "bob", "carol", "greedy")}
 """The callers, and their API keys: Alice and Bob ask, Carol hoards jobs, one is greedy"""
-QUOTA_JOBS = 32
+HOARD = 32
+"""Jobs that Carol leaves until she removes them all"""
 MAX_CONCURRENT = 24
 MIB = 2**20
 
@@ -22,7 +23,6 @@ SETTINGS = {
     "GEODESIC_JOB_TTL": "60",
     "GEODESIC_QUEUE_SIZE": "16",
     "GEODESIC_MAX_CONCURRENT": str(MAX_CONCURRENT),
-    "GEODESIC_QUOTA_JOBS": str(QUOTA_JOBS),
     "GEODESIC_API_KEYS": ",".join(f"{name}:{secret}" for name, secret in SECRETS.items()),
     "GEODESIC_ALLOWED_HOSTS": "localhost,127.0.0.1",
     # A worker that is killed takes its memory along, so that no growth would be seen.

@@ -285,7 +285,6 @@ def _wrong(opened: OpenMesh) -> Iterator[Request]:
     yield get("none", "/v1", 421, "host_not_allowed", Host="evil.example")
     headers = {**JSON_BODY, "Origin": "https://evil.example"}
     yield post(path, f"{link}/path", 403, "origin_not_allowed", headers=headers)
-    yield Request("deleteMesh", "DELETE", link, expected=Expected(403, "forbidden"))
 
 
 def _points(body: Mapping[str, Sequence[int]]) -> Mapping[str, Any]:

@@ -2,6 +2,7 @@
 
 from geodesic_client.answers import (
     Border,
+    Boundary,
     Distances,
     ErrorBound,
     Isoline,
@@ -10,12 +11,14 @@ from geodesic_client.answers import (
     Job,
     ListedMesh,
     LocatedPoint,
+    LogMap,
     Matrix,
     Mesh,
     Neighbour,
     Path,
     Step,
     StoredMatrix,
+    StraightLine,
 )
 from geodesic_client.async_client import AsyncClient
 from geodesic_client.bars import progress_bar
@@ -26,6 +29,7 @@ from geodesic_client.points import curve, edge, face, position, starting_at
 __all__ = [
     "AsyncClient",
     "Border",
+    "Boundary",
     "Client",
     "Distances",
     "ErrorBound",
@@ -36,6 +40,7 @@ __all__ = [
     "Job",
     "ListedMesh",
     "LocatedPoint",
+    "LogMap",
     "Matrix",
     "Mesh",
     "Neighbour",
@@ -43,6 +48,7 @@ __all__ = [
     "ProblemError",
     "Step",
     "StoredMatrix",
+    "StraightLine",
     "UnreachableError",
     "curve",
     "edge",

@@ -79,7 +79,7 @@ class Path:
     length: float
     """Infinite where there is no path"""
     points: Floats
-    """(K, 3), from source to target; (0, 3) where there is no path"""
+    """(K, 3), from source to target; (0, 3) where there is no path, or the mesh has no positions"""
     faces: Integers
     """The face of each piece, (K − 1,)"""
     locations: Sequence[Mapping[str, Any]]
@@ -106,17 +106,21 @@ class Step:
 
 @dataclass(frozen=True)
 class Isoline:
-    """A line of points at one distance."""
+    """A line of points at one distance, or of one value."""
 
     points: Floats
+    """(K, 3), or (0, 3) on a mesh without positions, as for all lines"""
     faces: Integers
     closed: bool
     length: float
+    locations: Sequence[Mapping[str, Any]] = ()
+    """Its points, each as a face and the weights of its corners: where they were asked for, and on
+    a mesh without positions"""
 
 
 @dataclass(frozen=True)
 class IsolineLevel:
-    """The lines at one distance."""
+    """The lines at one distance, or of one value."""
 
     level: float
     lines: Sequence[Isoline]
@@ -124,7 +128,7 @@ class IsolineLevel:
 
 @dataclass(frozen=True)
 class Isolines:
-    """Lines of equal distance."""
+    """Lines of equal distance, or of equal values, which are exact."""
 
     levels: Sequence[IsolineLevel]
     chord_error: float
@@ -141,6 +145,24 @@ class Border:
     faces: Integers
     closed: bool
     length: float
+    locations: Sequence[Mapping[str, Any]] = ()
+    """Its points, each as a face and the weights of its corners: where they were asked for, and on
+    a mesh without positions"""
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """A line along edges that have one face, with the surface on its left."""
+
+    vertices: Integers
+    """(K,)"""
+    points: Floats
+    faces: Integers
+    closed: bool
+    length: float
+    locations: Sequence[Mapping[str, Any]] = ()
+    """Its points, each as a face and the weights of its corners: where they were asked for, and on
+    a mesh without positions"""
 
 
 @dataclass(frozen=True)
@@ -192,6 +214,39 @@ class Neighbour:
     candidate: int
     """Index into the candidates"""
     distance: float
+
+
+@dataclass(frozen=True)
+class LogMap:
+    """Where each vertex lies as seen from a source: how far, and in which direction."""
+
+    distances: Floats
+    """(V,), infinite where unreachable"""
+    angles: Floats
+    """(V,), radians, at which the shortest path leaves the source; NaN where unreachable"""
+    coordinates: Floats
+    """(V, 2), in the tangent plane; NaN where unreachable"""
+    bends: Integers
+    """(V,), vertices that the path bends at; −1 where unreachable"""
+    total_angle: float
+    """Sum of the angles of the surface around the source, radians"""
+
+
+@dataclass(frozen=True)
+class StraightLine:
+    """A straightest line."""
+
+    length: float
+    points: Floats
+    """(K, 3), or (0, 3) on a mesh that is given by the lengths of its edges alone"""
+    faces: Integers
+    """The face of each piece, (K − 1,)"""
+    locations: Sequence[Mapping[str, Any]]
+    """Its K points, each as a face and the weights of its corners"""
+    stopped: str
+    """``length``, ``boundary``, ``barrier``, ``vertex`` or ``non_manifold``"""
+    end_direction: float
+    """Radians at the last point; NaN where directions have no meaning"""
 
 
 @dataclass(frozen=True)
@@ -298,7 +353,7 @@ def to_isolines(response: httpx2.Response) -> Isolines:
     """Return isolines."""
     document = response.json()
     levels = [
-        IsolineLevel(each["level"], [_to_isoline(line) for line in each["lines"]])
+        IsolineLevel(each["level"], [Isoline(**_members_of(line)) for line in each["lines"]])
         for each in document["isolines"]
     ]
     return Isolines(levels, document["chord_error"], ErrorBound(**document["error_bound"]))
@@ -307,14 +362,16 @@ def to_isolines(response: httpx2.Response) -> Isolines:
 def to_borders(response: httpx2.Response) -> list[Border]:
     """Return borders."""
     return [
-        Border(
-            (line["sources"][0], line["sources"][1]),
-            np.array(line["points"], np.float64).reshape(-1, 3),
-            np.array(line["faces"], np.int64),
-            line["closed"],
-            line["length"],
-        )
+        Border((line["sources"][0], line["sources"][1]), **_members_of(line))
         for line in response.json()["borders"]
+    ]
+
+
+def to_boundaries(response: httpx2.Response) -> list[Boundary]:
+    """Return boundaries."""
+    return [
+        Boundary(np.array(line["vertices"], np.int64), **_members_of(line))
+        for line in response.json()["boundaries"]
     ]
 
 
@@ -349,14 +406,48 @@ def to_neighbours(response: httpx2.Response) -> list[Neighbour]:
     return [Neighbour(each["candidate"], each["distance"]) for each in response.json()["nearest"]]
 
 
+def to_log_map(response: httpx2.Response) -> LogMap:
+    """Return a log map, from numpy's format."""
+    columns = to_array(response).astype(np.float64, copy=False)
+    return LogMap(
+        distances=columns[:, 0],
+        angles=columns[:, 1],
+        coordinates=columns[:, 2:4],
+        bends=columns[:, 4].astype(np.int64),
+        total_angle=float(_members_of_headers(response)["total_angle"]),
+    )
+
+
+def to_lines(response: httpx2.Response) -> list[StraightLine]:
+    """Return straightest lines, from JSON."""
+    return [_to_line(each) for each in response.json()["lines"]]
+
+
+def _to_line(line: Mapping[str, Any]) -> StraightLine:
+    direction = line["end_direction"]
+    return StraightLine(
+        length=line["length"],
+        points=np.array(line["points"] or [], np.float64).reshape(-1, 3),
+        faces=np.array(line["faces"], np.int64),
+        locations=line["locations"],
+        stopped=line["stopped"],
+        end_direction=np.nan if direction is None else direction,
+    )
+
+
 def to_located(response: httpx2.Response) -> list[LocatedPoint | None]:
     """Return the nearest points, None for positions that are too far away."""
     return [None if each is None else _to_located(each) for each in response.json()["points"]]
 
 
-def _to_isoline(line: Mapping[str, Any]) -> Isoline:
-    points = np.array(line["points"], np.float64).reshape(-1, 3)
-    return Isoline(points, np.array(line["faces"], np.int64), line["closed"], line["length"])
+def _members_of(line: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "points": np.array(line["points"] or [], np.float64).reshape(-1, 3),
+        "faces": np.array(line["faces"], np.int64),
+        "closed": line["closed"],
+        "length": line["length"],
+        "locations": line.get("locations") or (),
+    }
 
 
 def _to_located(each: Mapping[str, Any]) -> LocatedPoint:

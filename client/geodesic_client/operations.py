@@ -18,24 +18,30 @@ from geodesic_client.answers import (
     NPY,
     NPZ,
     Border,
+    Boundary,
     Distances,
     Isolines,
     Job,
     ListedMesh,
     LocatedPoint,
+    LogMap,
     Matrix,
     Mesh,
     Neighbour,
     Path,
     Step,
     StoredMatrix,
+    StraightLine,
     to_array,
     to_borders,
+    to_boundaries,
     to_distances,
     to_isolines,
     to_job,
+    to_lines,
     to_listed_mesh,
     to_located,
+    to_log_map,
     to_matrix,
     to_mesh,
     to_neighbours,
@@ -66,11 +72,14 @@ Kind = Literal[
     "paths",
     "isolines",
     "borders",
+    "boundaries",
     "matrix",
     "nearest",
+    "log-map",
+    "trace",
     "locate",
 ]
-ArrayName = Literal["vertices", "faces", "vertex_map", "face_map", "components"]
+ArrayName = Literal["vertices", "faces", "lengths", "vertex_map", "face_map", "components"]
 
 _PART_BYTES = 2**23
 """Bytes of a stored matrix that are read at a time"""
@@ -258,8 +267,9 @@ def paths(
 
 def isolines(
     mesh: Mesh | str,
-    sources: Point | Sequence[Point],
+    sources: Point | Sequence[Point] | None = None,
     *,
+    values: ArrayLike | None = None,
     levels: Sequence[float] | None = None,
     count: int | None = None,
     method: Literal["exact", "approximate"] = "exact",
@@ -268,14 +278,17 @@ def isolines(
     max_distance: float | None = None,
     chord_error: float | None = None,
     barriers: Sequence[int] = (),
+    include: Sequence[Literal["locations"]] = (),
     progress: Progress = ignore_progress,
 ) -> Flow[Isolines]:
     """Return the lines at some distances (``levels``), or at ``count`` evenly spaced ones.
 
-    ``sources`` is a point, or several.
+    ``sources`` is a point, or several. In their place, ``values`` (V,) are your own: lines are at
+    levels of these, and end where a value is NaN or infinite.
     """
     body = _body(
-        sources=as_points(sources),
+        sources=None if sources is None else as_points(sources),
+        values=None if values is None else _with_none(values),
         levels=levels,
         count=count,
         method=method,
@@ -284,6 +297,7 @@ def isolines(
         max_distance=max_distance,
         chord_error=chord_error,
         barriers=barriers,
+        include=include,
     )
     return (yield from _ask(mesh, "isolines", body, to_isolines, progress))
 
@@ -295,13 +309,30 @@ def borders(
     max_distance: float | None = None,
     chord_error: float | None = None,
     barriers: Sequence[int] = (),
+    include: Sequence[Literal["locations"]] = (),
     progress: Progress = ignore_progress,
 ) -> Flow[list[Border]]:
     """Return the lines between the parts of the surface that are nearest to each source."""
     body = _body(
-        sources=sources, max_distance=max_distance, chord_error=chord_error, barriers=barriers
+        sources=sources,
+        max_distance=max_distance,
+        chord_error=chord_error,
+        barriers=barriers,
+        include=include,
     )
     return (yield from _ask(mesh, "borders", body, to_borders, progress))
+
+
+def boundaries(
+    mesh: Mesh | str,
+    *,
+    barriers: Sequence[int] = (),
+    include: Sequence[Literal["locations"]] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[list[Boundary]]:
+    """Return the boundary of the surface, longest line first; none for a closed surface."""
+    body = _body(barriers=barriers, include=include)
+    return (yield from _ask(mesh, "boundaries", body, to_boundaries, progress))
 
 
 def matrix(
@@ -428,6 +459,52 @@ def nearest(
     return (yield from _ask(mesh, "nearest", body, to_neighbours, progress))
 
 
+def log_map(
+    mesh: Mesh | str,
+    source: Point,
+    *,
+    x_axis: Point | Sequence[float] | None = None,
+    rescale: bool = True,
+    max_distance: float | None = None,
+    barriers: Sequence[int] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[LogMap]:
+    """Return how far each vertex is from a source, and in which direction.
+
+    Angles are measured from ``x_axis``: a point to look at, or a vector in space.
+    """
+    body = _body(
+        source=source, x_axis=x_axis, rescale=rescale, max_distance=max_distance, barriers=barriers
+    )
+    return (yield from _ask(mesh, "log-map", body, to_log_map, progress, NPY))
+
+
+def trace(
+    mesh: Mesh | str,
+    starts: Point | Sequence[Point],
+    directions: ArrayLike,
+    lengths: ArrayLike,
+    *,
+    at_vertices: Literal["straight", "stop"] = "straight",
+    barriers: Sequence[int] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[list[StraightLine]]:
+    """Return the straightest lines from some points in some directions, for some lengths.
+
+    Directions are angles (N,), in radians, or vectors in space (N, 3). Of starts, directions and
+    lengths there is one for all lines, or one for each.
+    """
+    given = np.asarray(directions, np.float64)
+    body = _body(
+        starts=as_points(starts),
+        directions=given if given.ndim == 2 else np.atleast_1d(given),
+        lengths=np.atleast_1d(np.asarray(lengths, np.float64)),
+        at_vertices=at_vertices,
+        barriers=barriers,
+    )
+    return (yield from _ask(mesh, "trace", body, to_lines, progress))
+
+
 def locate(
     mesh: Mesh | str,
     positions: Sequence[Sequence[float]] | ArrayLike,
@@ -499,6 +576,12 @@ def _body(**members: Any) -> dict[str, Any]:
     return {name: value for name, value in members.items() if value is not None}
 
 
+def _with_none(values: ArrayLike) -> list[float | None]:
+    """Return numbers as JSON has them: None where they are not finite."""
+    numbers = np.asarray(values, np.float64)
+    return [each if np.isfinite(each) else None for each in numbers.tolist()]
+
+
 def _as_json(value: Any) -> Any:
     """Return what numpy's numbers and arrays, and ranges, are in JSON."""
     if isinstance(value, np.generic | np.ndarray):
@@ -547,11 +630,14 @@ class Operations:
     paths = Method(paths)
     isolines = Method(isolines)
     borders = Method(borders)
+    boundaries = Method(boundaries)
     matrix = Method(matrix)
     store_matrix = Method(store_matrix)
     matrix_rows = Method(matrix_rows)
     save_matrix = Method(save_matrix)
     nearest = Method(nearest)
+    log_map = Method(log_map)
+    trace = Method(trace)
     locate = Method(locate)
     jobs = Method(jobs)
     job = Method(job)

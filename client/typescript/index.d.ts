@@ -98,8 +98,10 @@ export interface paths {
         get?: never;
         put?: never;
         /**
-         * Lines of equal distance from sources
+         * Lines of equal distance from sources, or of equal values
          * @description Return the polylines of points at each level, exact where they cross edges.
+         *
+         *     The values are your own, one for each vertex, and of any sign. What is at a level itself counts as below it.
          */
         post: operations["computeIsolines"];
         delete?: never;
@@ -124,6 +126,26 @@ export interface paths {
          *     They are exact where they cross edges and where they meet.
          */
         post: operations["computeBorders"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/meshes/{mesh_id}/boundaries": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * The boundary of the surface, as curves along its edges
+         * @description Return the curves of edges with one face, longest first, with the surface on their left.
+         */
+        post: operations["computeBoundaries"];
         delete?: never;
         options?: never;
         head?: never;
@@ -173,6 +195,52 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/meshes/{mesh_id}/log-map": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * How far all vertices are from a point, and in which direction: its exact log map
+         * @description Return the distance of each vertex, the angle at which its shortest path leaves the source, and its coordinates in
+         *     the tangent plane.
+         *
+         *     Shortest paths bend at saddles and at the boundary. All that lies behind the first bend is seen in its
+         *     direction; `bends` tells where.
+         */
+        post: operations["computeLogMap"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/meshes/{mesh_id}/trace": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Straightest lines from points in directions
+         * @description Return the lines that go straight on over faces and edges, and at equal angles through vertices.
+         *
+         *     They end at their length, at the boundary, at barriers, and where more than two faces meet.
+         */
+        post: operations["traceLines"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/meshes/{mesh_id}/locate": {
         parameters: {
             query?: never;
@@ -216,6 +284,11 @@ export interface paths {
          *     bzip2, xz or zip; the body, except a form, may also have `Content-Encoding: gzip`. Vertices and
          *     triangles keep the order they have in the file; polygons become triangles in their place, and
          *     `face_map` leads back to them.
+         *
+         *     A surface may be given by the lengths of its edges: as JSON with `faces` and `lengths`, or as an
+         *     `.npz` file of these arrays, in both with `vertices` or without. Without, all that lies on the
+         *     surface is answered, with `null` in place of positions; what needs space is refused as
+         *     `not_embedded`.
          */
         post: operations["createMesh"];
         delete?: never;
@@ -242,7 +315,7 @@ export interface paths {
          * Remove a mesh and its results
          * @description Remove a mesh; queries that run on it are still answered.
          *
-         *     Where keys are set, only the key that stored the mesh first may remove it.
+         *     Where keys are set, any key may remove it.
          */
         delete: operations["deleteMesh"];
         options?: never;
@@ -259,7 +332,7 @@ export interface paths {
         };
         /**
          * Read an array of a mesh
-         * @description Send `vertices`, `faces`, `vertex_map`, `face_map` or `components`; ranges are served.
+         * @description Send `vertices`, `faces`, `lengths`, `vertex_map`, `face_map` or `components`, or a range.
          */
         get: operations["getMeshArray"];
         put?: never;
@@ -278,7 +351,7 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * List your jobs
+         * List the jobs
          * @description List jobs, the newest first, `limit` at a time.
          */
         get: operations["listJobs"];
@@ -536,6 +609,35 @@ export interface components {
          */
         BorderDocument: {
             /**
+             * Closed
+             * @description Whether the line leads from its last point back to the first, which is not repeated
+             */
+            closed: boolean;
+            /**
+             * Length
+             * @description The length in mesh units
+             */
+            length: number;
+            /**
+             * Points
+             * @description Null on a mesh that is given by the lengths of its edges alone
+             */
+            points: [
+                number,
+                number,
+                number
+            ][] | null;
+            /**
+             * Faces
+             * @description The face of each segment
+             */
+            faces: number[];
+            /**
+             * Locations
+             * @description The points again, on the surface: if included, and on a mesh without positions
+             */
+            locations?: components["schemas"]["Location"][] | null;
+            /**
              * Sources
              * @description The two sources whose territories the line separates: indices into `sources`, the lower first
              */
@@ -543,24 +645,6 @@ export interface components {
                 number,
                 number
             ];
-            /**
-             * Closed
-             * @description Whether the line leads from its last point back to the first, which is not repeated
-             */
-            closed: boolean;
-            /** Length */
-            length: number;
-            /** Points */
-            points: [
-                number,
-                number,
-                number
-            ][];
-            /**
-             * Faces
-             * @description The face of each segment
-             */
-            faces: number[];
         };
         /**
          * BordersAnswer
@@ -617,6 +701,11 @@ export interface components {
              *     ]
              */
             barriers?: number[];
+            /**
+             * Include
+             * @description `locations`: also the points of lines as faces and weights. On a mesh without positions they come in any case. Default: `[]`
+             */
+            include?: "locations"[];
             /** Sources */
             sources: (number | components["schemas"]["VertexSource"] | components["schemas"]["EdgeSource"] | components["schemas"]["FaceSource"] | components["schemas"]["PositionSource"] | components["schemas"]["CurveSource"])[];
             /**
@@ -629,6 +718,87 @@ export interface components {
              * @description Largest distance of the returned chords from the exact lines, which are mostly hyperbolas inside faces, in mesh units. At least a billionth of the bounding box's diagonal; a thousandth of the mean edge length if not given
              */
             chord_error?: number | null;
+        };
+        /**
+         * BoundariesAnswer
+         * @description The boundary of the surface, longest curve first; empty for a surface without boundary.
+         */
+        BoundariesAnswer: {
+            /**
+             * Kind
+             * @constant
+             */
+            kind: "boundaries";
+            /** Mesh Id */
+            mesh_id: string;
+            /**
+             * Boundaries
+             * @description Closed lines, and open lines that end at an edge of three faces or more
+             */
+            boundaries: components["schemas"]["BoundaryDocument"][];
+            /** Warnings */
+            warnings: string[];
+        };
+        /**
+         * BoundariesRequest
+         * @description The boundary of the surface. Blocked faces are no part of it: their rim is a boundary.
+         * @example {}
+         */
+        BoundariesRequest: {
+            /**
+             * Barriers
+             * @description Indices of blocked faces. They act as holes, and paths may bend at their corners. Default: `[]`
+             * @example [
+             *       7,
+             *       8
+             *     ]
+             */
+            barriers?: number[];
+            /**
+             * Include
+             * @description `locations`: also the points of lines as faces and weights. On a mesh without positions they come in any case. Default: `[]`
+             */
+            include?: "locations"[];
+        };
+        /**
+         * BoundaryDocument
+         * @description A polyline of boundary edges, with the surface on its left.
+         */
+        BoundaryDocument: {
+            /**
+             * Closed
+             * @description Whether the line leads from its last point back to the first, which is not repeated
+             */
+            closed: boolean;
+            /**
+             * Length
+             * @description The length in mesh units
+             */
+            length: number;
+            /**
+             * Points
+             * @description Null on a mesh that is given by the lengths of its edges alone
+             */
+            points: [
+                number,
+                number,
+                number
+            ][] | null;
+            /**
+             * Faces
+             * @description The face of each segment
+             */
+            faces: number[];
+            /**
+             * Locations
+             * @description The points again, on the surface: if included, and on a mesh without positions
+             */
+            locations?: components["schemas"]["Location"][] | null;
+            /**
+             * Vertices
+             * @description The vertex at each point
+             */
+            vertices: number[];
         };
         /**
          * Curve
@@ -977,7 +1147,7 @@ export interface components {
         };
         /**
          * IsolineDocument
-         * @description A polyline of points at one distance.
+         * @description A polyline of points at one distance, or of one value.
          */
         IsolineDocument: {
             /**
@@ -985,39 +1155,52 @@ export interface components {
              * @description Whether the line leads from its last point back to the first, which is not repeated
              */
             closed: boolean;
-            /** Length */
+            /**
+             * Length
+             * @description The length in mesh units
+             */
             length: number;
-            /** Points */
+            /**
+             * Points
+             * @description Null on a mesh that is given by the lengths of its edges alone
+             */
             points: [
                 number,
                 number,
                 number
-            ][];
+            ][] | null;
             /**
              * Faces
              * @description The face of each segment
              */
             faces: number[];
+            /**
+             * Locations
+             * @description The points again, on the surface: if included, and on a mesh without positions
+             */
+            locations?: components["schemas"]["Location"][] | null;
         };
         /**
          * IsolineLevel
-         * @description The lines at one distance.
+         * @description The lines at one distance, or of one value.
          */
         IsolineLevel: {
             /**
              * Level
-             * @description The distance in mesh units
+             * @description The distance in mesh units, or the value
              */
             level: number;
             /**
              * Lines
-             * @description Closed lines, and open lines that end at the boundary or at an edge of three faces or more; empty if no point is at that distance
+             * @description Closed lines, and open lines that end at the boundary or at an edge of three faces or more, or where values are missing; empty if no point is at that level
              */
             lines: components["schemas"]["IsolineDocument"][];
         };
         /**
          * IsolinesAnswer
          * @description The lines of each level, in the order of the levels.
+         *
+         *     Of values they are exact, with an error bound and a chord error of 0, without sources.
          */
         IsolinesAnswer: {
             /**
@@ -1052,7 +1235,9 @@ export interface components {
         };
         /**
          * IsolinesRequest
-         * @description Lines of equal distance from the nearest of ``sources``: at ``levels``, or at ``count``.
+         * @description Lines of equal distance from the nearest of ``sources``, or of equal ``values``.
+         *
+         *     They are drawn at ``levels``, or at ``count`` of them.
          * @example {
          *       "count": 10,
          *       "sources": [
@@ -1075,6 +1260,17 @@ export interface components {
          *         }
          *       ]
          *     }
+         * @example {
+         *       "levels": [
+         *         0
+         *       ],
+         *       "values": [
+         *         0.5,
+         *         -1,
+         *         null,
+         *         2
+         *       ]
+         *     }
          */
         IsolinesRequest: {
             /**
@@ -1086,6 +1282,11 @@ export interface components {
              *     ]
              */
             barriers?: number[];
+            /**
+             * Include
+             * @description `locations`: also the points of lines as faces and weights. On a mesh without positions they come in any case. Default: `[]`
+             */
+            include?: "locations"[];
             /**
              * Method
              * @description `fast` is not available: lines need windows, which it does not have. Default: `exact`
@@ -1102,16 +1303,24 @@ export interface components {
              * @description For `approximate`: the allowed error in mesh units; if both errors are given, both hold
              */
             absolute_error?: number | null;
-            /** Sources */
-            sources: (number | components["schemas"]["VertexSource"] | components["schemas"]["EdgeSource"] | components["schemas"]["FaceSource"] | components["schemas"]["PositionSource"] | components["schemas"]["CurveSource"])[];
+            /**
+             * Sources
+             * @description Where distances start, at least one; give these or `values`. Default: `[]`
+             */
+            sources?: (number | components["schemas"]["VertexSource"] | components["schemas"]["EdgeSource"] | components["schemas"]["FaceSource"] | components["schemas"]["PositionSource"] | components["schemas"]["CurveSource"])[];
+            /**
+             * Values
+             * @description A number for each vertex, linear on each face, or `null` where there is none. Goes without `sources` and all that is about distances: `method` with its errors, `max_distance` and `chord_error`. Lines have the higher values on their left
+             */
+            values?: (number | null)[] | null;
             /**
              * Levels
-             * @description Distances in mesh units; give these or `count`
+             * @description Distances in mesh units, greater than 0, or any values; give these or `count`
              */
             levels?: number[] | null;
             /**
              * Count
-             * @description Number of levels, evenly spaced between 0 and the largest distance of a reachable vertex, both left out
+             * @description Number of levels, evenly spaced between 0 and the largest distance of a reachable vertex, or between the lowest and the highest of `values`, both left out
              */
             count?: number | null;
             /**
@@ -1301,6 +1510,101 @@ export interface components {
             ];
         };
         /**
+         * LogMapAnswer
+         * @description Where all vertices lie as seen from a source: how far, and in which direction.
+         */
+        LogMapAnswer: {
+            /**
+             * Kind
+             * @constant
+             */
+            kind: "log_map";
+            /** Mesh Id */
+            mesh_id: string;
+            source: components["schemas"]["ResolvedPoint"];
+            /**
+             * Total Angle
+             * @description Sum of the angles of the surface around the source, in radians
+             */
+            total_angle: number;
+            /**
+             * Distances
+             * @description In mesh units; `null` where unreachable
+             */
+            distances: (number | null)[];
+            /**
+             * Angles
+             * @description The angle on the surface at which the shortest path leaves the source: in radians, counter-clockwise seen from outside, from 0 up to `total_angle`. At a boundary, angles before the x axis are negative. `null` where unreachable and at the source
+             */
+            angles: (number | null)[];
+            /**
+             * Coordinates
+             * @description Each vertex in the tangent plane; twice `null` where unreachable
+             */
+            coordinates: [
+                number | null,
+                number | null
+            ][];
+            /**
+             * Bends
+             * @description Number of vertices that the path bends at. Behind the first bend all vertices have its direction. `null` where unreachable
+             */
+            bends: (number | null)[];
+            unreachable: components["schemas"]["Unreachable"];
+            /** Warnings */
+            warnings: string[];
+        };
+        /**
+         * LogMapRequest
+         * @description How far all vertices are from ``source``, and in which direction; always exact.
+         * @example {
+         *       "source": {
+         *         "vertex": 0
+         *       }
+         *     }
+         * @example {
+         *       "max_distance": 2,
+         *       "source": {
+         *         "vertex": 0
+         *       },
+         *       "x_axis": {
+         *         "vertex": 7
+         *       }
+         *     }
+         */
+        LogMapRequest: {
+            /**
+             * Barriers
+             * @description Indices of blocked faces. They act as holes, and paths may bend at their corners. Default: `[]`
+             * @example [
+             *       7,
+             *       8
+             *     ]
+             */
+            barriers?: number[];
+            /** Source */
+            source: number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"];
+            /**
+             * X Axis
+             * @description From where angles are measured: a point to look at, by its shortest path, or a vector in space, which is projected to the surface. If not given: the edge that leaves a vertex in its lowest face, from corner 0 to corner 1 of the lowest face for other points, and where the surface begins at a boundary
+             */
+            x_axis?: ([
+                number,
+                number,
+                number
+            ] | (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])) | null;
+            /**
+             * Rescale
+             * @description Whether `coordinates` stretch or shrink the angles around the source to a full turn. Default: `true`
+             */
+            rescale?: boolean;
+            /**
+             * Max Distance
+             * @description Vertices farther than this, in mesh units, count as unreachable
+             */
+            max_distance?: number | null;
+        };
+        /**
          * MatrixAnswer
          * @description Distances in mesh units between many points.
          */
@@ -1378,12 +1682,15 @@ export interface components {
                 number,
                 number
             ] | null;
-            /** Position */
+            /**
+             * Position
+             * @description Null on a mesh that is given by the lengths of its edges alone
+             */
             position: [
                 number,
                 number,
                 number
-            ];
+            ] | null;
             /**
              * Component
              * @description The connected component of the mesh that contains the point. No path joins different components; other missing distances are beyond `max_distance`
@@ -1501,7 +1808,7 @@ export interface components {
             created: string;
             /**
              * Arrays
-             * @description Paths of its arrays, by name
+             * @description Paths of its arrays, by name: `lengths` where those of its edges were given, and no `vertices` without positions
              */
             arrays: {
                 [key: string]: string;
@@ -1556,7 +1863,10 @@ export interface components {
             /** Inconsistent Orientation */
             inconsistent_orientation: boolean;
             misoriented_edges: components["schemas"]["Sample"];
-            /** Bounds */
+            /**
+             * Bounds
+             * @description Lowest and highest corner of the bounding box; null for a mesh that is given by the lengths of its edges alone
+             */
             bounds: [
                 [
                     number,
@@ -1568,7 +1878,7 @@ export interface components {
                     number,
                     number
                 ]
-            ];
+            ] | null;
             /** Mean Edge Length */
             mean_edge_length: number;
         };
@@ -1635,12 +1945,15 @@ export interface components {
                 number,
                 number
             ] | null;
-            /** Position */
+            /**
+             * Position
+             * @description Null on a mesh that is given by the lengths of its edges alone
+             */
             position: [
                 number,
                 number,
                 number
-            ];
+            ] | null;
             /**
              * Candidate
              * @description Index into `candidates`
@@ -1709,7 +2022,10 @@ export interface components {
              * @description The length in mesh units; null without a path
              */
             length: number | null;
-            /** Points */
+            /**
+             * Points
+             * @description Null without a path, and on a mesh that is given by the lengths of its edges alone
+             */
             points: [
                 number,
                 number,
@@ -1830,7 +2146,10 @@ export interface components {
              * @description The length in mesh units; null without a path
              */
             length: number | null;
-            /** Points */
+            /**
+             * Points
+             * @description Null without a path, and on a mesh that is given by the lengths of its edges alone
+             */
             points: [
                 number,
                 number,
@@ -2081,12 +2400,15 @@ export interface components {
                 number,
                 number
             ] | null;
-            /** Position */
+            /**
+             * Position
+             * @description Null on a mesh that is given by the lengths of its edges alone
+             */
             position: [
                 number,
                 number,
                 number
-            ];
+            ] | null;
         };
         /**
          * ResolvedSource
@@ -2112,12 +2434,15 @@ export interface components {
                 number,
                 number
             ] | null;
-            /** Position */
+            /**
+             * Position
+             * @description Null on a mesh that is given by the lengths of its edges alone
+             */
             position: [
                 number,
                 number,
                 number
-            ];
+            ] | null;
             /** Start Distance */
             start_distance: number;
         };
@@ -2234,6 +2559,131 @@ export interface components {
              * @description Longest path to look for, past all waypoints, in mesh units
              */
             max_distance?: number | null;
+        };
+        /**
+         * StraightLine
+         * @description A straightest line.
+         */
+        StraightLine: {
+            /**
+             * Stopped
+             * @description What it ends at; `length` if it is as long as asked for
+             * @enum {string}
+             */
+            stopped: "length" | "boundary" | "barrier" | "vertex" | "non_manifold";
+            /**
+             * Length
+             * @description The length in mesh units
+             */
+            length: number;
+            /**
+             * End Direction
+             * @description The direction in which it would go on: an angle at its last point, in radians; null if directions have no meaning there
+             */
+            end_direction: number | null;
+            /**
+             * Points
+             * @description Null on a mesh that is given by the lengths of its edges alone
+             */
+            points: [
+                number,
+                number,
+                number
+            ][] | null;
+            /** Locations */
+            locations: components["schemas"]["Location"][];
+            /**
+             * Faces
+             * @description The face of each segment
+             */
+            faces: number[];
+        };
+        /**
+         * TraceAnswer
+         * @description Straightest lines, in the order of the request.
+         */
+        TraceAnswer: {
+            /**
+             * Kind
+             * @constant
+             */
+            kind: "trace";
+            /** Mesh Id */
+            mesh_id: string;
+            /** Starts */
+            starts: components["schemas"]["ResolvedPoint"][];
+            /** Lines */
+            lines: components["schemas"]["StraightLine"][];
+            /** Warnings */
+            warnings: string[];
+        };
+        /**
+         * TraceRequest
+         * @description Straightest lines from ``starts``. Each list has one item for all lines, or one for each.
+         * @example {
+         *       "directions": [
+         *         0,
+         *         1.5
+         *       ],
+         *       "lengths": [
+         *         2
+         *       ],
+         *       "starts": [
+         *         {
+         *           "vertex": 0
+         *         }
+         *       ]
+         *     }
+         * @example {
+         *       "directions": [
+         *         [
+         *           1,
+         *           0,
+         *           0
+         *         ]
+         *       ],
+         *       "lengths": [
+         *         2
+         *       ],
+         *       "starts": [
+         *         {
+         *           "vertex": 0
+         *         }
+         *       ]
+         *     }
+         */
+        TraceRequest: {
+            /**
+             * Barriers
+             * @description Indices of blocked faces. They act as holes, and paths may bend at their corners. Default: `[]`
+             * @example [
+             *       7,
+             *       8
+             *     ]
+             */
+            barriers?: number[];
+            /** Starts */
+            starts: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[];
+            /**
+             * Directions
+             * @description Angles, in radians, counter-clockwise from where those of a log map begin; or vectors in space, which are projected to the surface
+             */
+            directions: number[] | [
+                number,
+                number,
+                number
+            ][];
+            /**
+             * Lengths
+             * @description Lengths in mesh units
+             */
+            lengths: number[];
+            /**
+             * At Vertices
+             * @description `straight`: on through vertices, with equal angles on both sides; `stop`: to the first vertex. Default: `straight`
+             * @enum {string}
+             */
+            at_vertices?: "straight" | "stop";
         };
         /**
          * Unreachable
@@ -2453,7 +2903,7 @@ export interface operations {
             416: components["responses"]["Problem"];
             /** @description host_not_allowed */
             421: components["responses"]["Problem"];
-            /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
+            /** @description invalid_point, not_embedded, invalid_request, limit_exceeded, memory_limit */
             422: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -2591,7 +3041,7 @@ export interface operations {
             416: components["responses"]["Problem"];
             /** @description host_not_allowed */
             421: components["responses"]["Problem"];
-            /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
+            /** @description invalid_point, not_embedded, invalid_request, limit_exceeded, memory_limit */
             422: components["responses"]["Problem"];
             /** @description quota_exceeded, rate_limited */
             429: components["responses"]["ProblemForNow"];
@@ -2710,7 +3160,7 @@ export interface operations {
             416: components["responses"]["Problem"];
             /** @description host_not_allowed */
             421: components["responses"]["Problem"];
-            /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
+            /** @description invalid_point, not_embedded, invalid_request, limit_exceeded, memory_limit */
             422: components["responses"]["Problem"];
             /** @description quota_exceeded, rate_limited */
             429: components["responses"]["ProblemForNow"];
@@ -2819,7 +3269,7 @@ export interface operations {
             416: components["responses"]["Problem"];
             /** @description host_not_allowed */
             421: components["responses"]["Problem"];
-            /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
+            /** @description invalid_point, not_embedded, invalid_request, limit_exceeded, memory_limit */
             422: components["responses"]["Problem"];
             /** @description quota_exceeded, rate_limited */
             429: components["responses"]["ProblemForNow"];
@@ -2932,7 +3382,7 @@ export interface operations {
             416: components["responses"]["Problem"];
             /** @description host_not_allowed */
             421: components["responses"]["Problem"];
-            /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
+            /** @description invalid_point, not_embedded, invalid_request, limit_exceeded, memory_limit */
             422: components["responses"]["Problem"];
             /** @description quota_exceeded, rate_limited */
             429: components["responses"]["ProblemForNow"];
@@ -3045,7 +3495,7 @@ export interface operations {
             416: components["responses"]["Problem"];
             /** @description host_not_allowed */
             421: components["responses"]["Problem"];
-            /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
+            /** @description invalid_point, not_embedded, invalid_request, limit_exceeded, memory_limit */
             422: components["responses"]["Problem"];
             /** @description quota_exceeded, rate_limited */
             429: components["responses"]["ProblemForNow"];
@@ -3158,7 +3608,120 @@ export interface operations {
             416: components["responses"]["Problem"];
             /** @description host_not_allowed */
             421: components["responses"]["Problem"];
-            /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
+            /** @description invalid_point, not_embedded, invalid_request, limit_exceeded, memory_limit */
+            422: components["responses"]["Problem"];
+            /** @description quota_exceeded, rate_limited */
+            429: components["responses"]["ProblemForNow"];
+            /** @description header_too_large */
+            431: components["responses"]["Problem"];
+            /** @description worker_died, mesh_damaged, internal_error */
+            500: components["responses"]["Problem"];
+            /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
+            503: components["responses"]["ProblemForNow"];
+            /** @description deadline_exceeded */
+            504: components["responses"]["Problem"];
+            /** @description storage_full, quota_exceeded */
+            507: components["responses"]["Problem"];
+        };
+    };
+    computeBoundaries: {
+        parameters: {
+            query?: {
+                /** @description Overrides `Accept` */
+                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv";
+                /** @description Type of the numbers in `npy`, `npz` and `octets` */
+                dtype?: "float64" | "float32";
+            };
+            header?: {
+                /** @description The longest time that the client waits, in milliseconds; it bounds no job */
+                "x-timeout-ms"?: number;
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
+                prefer?: string;
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job. With `Prefer: respond-async` only */
+                "idempotency-key"?: string;
+                /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
+                Range?: string;
+            };
+            path: {
+                mesh_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["BoundariesRequest"];
+            };
+        };
+        responses: {
+            /** @description The lines, closed and open. In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` names what is too long for one */
+            200: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BoundariesAnswer"];
+                    "model/obj": string;
+                    "text/csv": string;
+                };
+            };
+            /** @description With `Prefer: respond-async`: the job */
+            202: {
+                headers: {
+                    Location: components["headers"]["Location"];
+                    "Preference-Applied": components["headers"]["Preference-Applied"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobDocument"];
+                };
+            };
+            /** @description The requested range */
+            206: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Content-Range": components["headers"]["Content-Range"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": string;
+                    "model/obj": string;
+                    "text/csv": string;
+                };
+            };
+            /** @description malformed_body, idempotency_key_unused, malformed_request */
+            400: components["responses"]["Problem"];
+            /** @description unauthorized */
+            401: components["responses"]["Unauthorized"];
+            /** @description origin_not_allowed */
+            403: components["responses"]["Problem"];
+            /** @description mesh_not_found */
+            404: components["responses"]["Problem"];
+            /** @description not_acceptable */
+            406: components["responses"]["Problem"];
+            /** @description upload_too_large, result_too_large */
+            413: components["responses"]["Problem"];
+            /** @description unsupported_media_type */
+            415: components["responses"]["Problem"];
+            /** @description range_not_satisfiable */
+            416: components["responses"]["Problem"];
+            /** @description host_not_allowed */
+            421: components["responses"]["Problem"];
+            /** @description invalid_point, not_embedded, invalid_request, limit_exceeded, memory_limit */
             422: components["responses"]["Problem"];
             /** @description quota_exceeded, rate_limited */
             429: components["responses"]["ProblemForNow"];
@@ -3277,7 +3840,7 @@ export interface operations {
             416: components["responses"]["Problem"];
             /** @description host_not_allowed */
             421: components["responses"]["Problem"];
-            /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
+            /** @description invalid_point, not_embedded, invalid_request, limit_exceeded, memory_limit */
             422: components["responses"]["Problem"];
             /** @description quota_exceeded, rate_limited */
             429: components["responses"]["ProblemForNow"];
@@ -3388,7 +3951,253 @@ export interface operations {
             416: components["responses"]["Problem"];
             /** @description host_not_allowed */
             421: components["responses"]["Problem"];
-            /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
+            /** @description invalid_point, not_embedded, invalid_request, limit_exceeded, memory_limit */
+            422: components["responses"]["Problem"];
+            /** @description quota_exceeded, rate_limited */
+            429: components["responses"]["ProblemForNow"];
+            /** @description header_too_large */
+            431: components["responses"]["Problem"];
+            /** @description worker_died, mesh_damaged, internal_error */
+            500: components["responses"]["Problem"];
+            /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
+            503: components["responses"]["ProblemForNow"];
+            /** @description deadline_exceeded */
+            504: components["responses"]["Problem"];
+            /** @description storage_full, quota_exceeded */
+            507: components["responses"]["Problem"];
+        };
+    };
+    computeLogMap: {
+        parameters: {
+            query?: {
+                /** @description Overrides `Accept` */
+                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv";
+                /** @description Type of the numbers in `npy`, `npz` and `octets` */
+                dtype?: "float64" | "float32";
+            };
+            header?: {
+                /** @description The longest time that the client waits, in milliseconds; it bounds no job */
+                "x-timeout-ms"?: number;
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
+                prefer?: string;
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job. With `Prefer: respond-async` only */
+                "idempotency-key"?: string;
+                /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
+                Range?: string;
+            };
+            path: {
+                mesh_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["LogMapRequest"];
+            };
+        };
+        responses: {
+            /** @description The map. In binary, a row for each vertex: distance, angle, two coordinates, bends (-1 where unreachable); as PLY, the mesh with these at its vertices. In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` names what is too long for one */
+            200: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "Geodesic-Dtype": components["headers"]["Geodesic-Dtype"];
+                    "Geodesic-Shape": components["headers"]["Geodesic-Shape"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LogMapAnswer"];
+                    "application/x-npy": string;
+                    "application/octet-stream": string;
+                    "text/csv": string;
+                    "model/ply": string;
+                };
+            };
+            /** @description With `Prefer: respond-async`: the job */
+            202: {
+                headers: {
+                    Location: components["headers"]["Location"];
+                    "Preference-Applied": components["headers"]["Preference-Applied"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobDocument"];
+                };
+            };
+            /** @description The requested range */
+            206: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Content-Range": components["headers"]["Content-Range"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": string;
+                    "application/x-npy": string;
+                    "application/octet-stream": string;
+                    "text/csv": string;
+                    "model/ply": string;
+                };
+            };
+            /** @description malformed_body, idempotency_key_unused, malformed_request */
+            400: components["responses"]["Problem"];
+            /** @description unauthorized */
+            401: components["responses"]["Unauthorized"];
+            /** @description origin_not_allowed */
+            403: components["responses"]["Problem"];
+            /** @description mesh_not_found */
+            404: components["responses"]["Problem"];
+            /** @description not_acceptable */
+            406: components["responses"]["Problem"];
+            /** @description upload_too_large, result_too_large */
+            413: components["responses"]["Problem"];
+            /** @description unsupported_media_type */
+            415: components["responses"]["Problem"];
+            /** @description range_not_satisfiable */
+            416: components["responses"]["Problem"];
+            /** @description host_not_allowed */
+            421: components["responses"]["Problem"];
+            /** @description invalid_point, not_embedded, invalid_request, limit_exceeded, memory_limit */
+            422: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description quota_exceeded, rate_limited */
+            429: components["responses"]["ProblemForNow"];
+            /** @description header_too_large */
+            431: components["responses"]["Problem"];
+            /** @description worker_died, mesh_damaged, internal_error */
+            500: components["responses"]["Problem"];
+            /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
+            503: components["responses"]["ProblemForNow"];
+            /** @description deadline_exceeded */
+            504: components["responses"]["Problem"];
+            /** @description storage_full, quota_exceeded */
+            507: components["responses"]["Problem"];
+        };
+    };
+    traceLines: {
+        parameters: {
+            query?: {
+                /** @description Overrides `Accept` */
+                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv";
+                /** @description Type of the numbers in `npy`, `npz` and `octets` */
+                dtype?: "float64" | "float32";
+            };
+            header?: {
+                /** @description The longest time that the client waits, in milliseconds; it bounds no job */
+                "x-timeout-ms"?: number;
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
+                prefer?: string;
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job. With `Prefer: respond-async` only */
+                "idempotency-key"?: string;
+                /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
+                Range?: string;
+            };
+            path: {
+                mesh_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["TraceRequest"];
+            };
+        };
+        responses: {
+            /** @description The lines. In binary, a row for each point, with the numbers of CSV: line, length, end_direction, point, x, y, z, face, u, v, w. In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` names what is too long for one */
+            200: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "Geodesic-Dtype": components["headers"]["Geodesic-Dtype"];
+                    "Geodesic-Shape": components["headers"]["Geodesic-Shape"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TraceAnswer"];
+                    "application/x-npy": string;
+                    "application/octet-stream": string;
+                    "model/obj": string;
+                    "text/csv": string;
+                };
+            };
+            /** @description With `Prefer: respond-async`: the job */
+            202: {
+                headers: {
+                    Location: components["headers"]["Location"];
+                    "Preference-Applied": components["headers"]["Preference-Applied"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobDocument"];
+                };
+            };
+            /** @description The requested range */
+            206: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Content-Range": components["headers"]["Content-Range"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": string;
+                    "application/x-npy": string;
+                    "application/octet-stream": string;
+                    "model/obj": string;
+                    "text/csv": string;
+                };
+            };
+            /** @description malformed_body, idempotency_key_unused, malformed_request */
+            400: components["responses"]["Problem"];
+            /** @description unauthorized */
+            401: components["responses"]["Unauthorized"];
+            /** @description origin_not_allowed */
+            403: components["responses"]["Problem"];
+            /** @description mesh_not_found */
+            404: components["responses"]["Problem"];
+            /** @description not_acceptable */
+            406: components["responses"]["Problem"];
+            /** @description upload_too_large, result_too_large */
+            413: components["responses"]["Problem"];
+            /** @description unsupported_media_type */
+            415: components["responses"]["Problem"];
+            /** @description range_not_satisfiable */
+            416: components["responses"]["Problem"];
+            /** @description host_not_allowed */
+            421: components["responses"]["Problem"];
+            /** @description invalid_point, not_embedded, invalid_request, limit_exceeded, memory_limit */
             422: components["responses"]["Problem"];
             /** @description quota_exceeded, rate_limited */
             429: components["responses"]["ProblemForNow"];
@@ -3499,7 +4308,7 @@ export interface operations {
             416: components["responses"]["Problem"];
             /** @description host_not_allowed */
             421: components["responses"]["Problem"];
-            /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
+            /** @description invalid_point, not_embedded, invalid_request, limit_exceeded, memory_limit */
             422: components["responses"]["Problem"];
             /** @description quota_exceeded, rate_limited */
             429: components["responses"]["ProblemForNow"];
@@ -3566,7 +4375,7 @@ export interface operations {
                 /** @description Name for people; if not given, the file name in a form, or the name of the sample */
                 name?: string;
                 /** @description Format of the file. By default, `Content-Type` tells it, else the suffix of its name in the form or in `Content-Disposition`, else its first bytes */
-                format?: "obj" | "off" | "ply" | "stl" | "glb" | "gltf" | "gii" | "freesurfer" | "vtk" | "vtp" | "vtu" | "vts" | "vtr" | "vti" | "asc";
+                format?: "obj" | "off" | "ply" | "stl" | "glb" | "gltf" | "gii" | "freesurfer" | "vtk" | "vtp" | "vtu" | "vts" | "vtr" | "vti" | "asc" | "npz";
                 /** @description `exact` joins vertices at the same position; a distance in mesh units joins those no farther apart, and so all that steps of this length lead to, from vertex to vertex */
                 merge?: ("none" | "exact") | number;
                 /** @description The sample to make, instead of reading a mesh */
@@ -3589,8 +4398,10 @@ export interface operations {
                     file: string;
                 };
                 "application/json": {
-                    vertices: number[][];
+                    vertices?: number[][];
                     faces: number[][];
+                    /** @description Lengths of the edges of each face, number i from corner i to corner i + 1: in place of vertices, or beside them */
+                    lengths?: number[][];
                 };
             };
         };
@@ -3651,7 +4462,7 @@ export interface operations {
             503: components["responses"]["ProblemForNow"];
             /** @description deadline_exceeded */
             504: components["responses"]["Problem"];
-            /** @description storage_full, quota_exceeded */
+            /** @description storage_full */
             507: components["responses"]["Problem"];
         };
     };
@@ -3741,7 +4552,7 @@ export interface operations {
             400: components["responses"]["Problem"];
             /** @description unauthorized */
             401: components["responses"]["Unauthorized"];
-            /** @description forbidden, origin_not_allowed */
+            /** @description origin_not_allowed */
             403: components["responses"]["Problem"];
             /** @description mesh_not_found */
             404: {
@@ -4096,7 +4907,7 @@ export interface operations {
             416: components["responses"]["Problem"];
             /** @description host_not_allowed */
             421: components["responses"]["Problem"];
-            /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
+            /** @description invalid_point, not_embedded, invalid_request, limit_exceeded, memory_limit */
             422: components["responses"]["Problem"];
             /** @description rate_limited */
             429: components["responses"]["ProblemForNow"];

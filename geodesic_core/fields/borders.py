@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from geodesic_core.arrays import Flags, Floats, Ints
+from geodesic_core.arrays import Flags, Ints
 from geodesic_core.control import Control, in_slices
 from geodesic_core.fields.isolines import (
     Arrays,
@@ -17,7 +17,6 @@ from geodesic_core.fields.isolines import (
     retained_sweep,
     starts_of,
 )
-from geodesic_core.fields.path import length_of
 from geodesic_core.fields.sources import Nodes
 from geodesic_core.fields.sweep_result import all_winners
 from geodesic_core.fields.sweeps import ExactSweep
@@ -25,12 +24,13 @@ from geodesic_core.kernels.borders.border_chains import trace_borders
 from geodesic_core.kernels.borders.border_lines import link_borders
 from geodesic_core.kernels.borders.outlines import cross_edges
 from geodesic_core.kernels.borders.territories import Territories, divide_faces, mixed_faces
-from geodesic_core.kernels.curves.chains import Chains, Lines
+from geodesic_core.kernels.curves.chains import Chains
 from geodesic_core.kernels.curves.thinning import thin_lines
 from geodesic_core.kernels.front.state import FACE
 from geodesic_core.kernels.mesh.half_edges import TAIL
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.retained.face_windows import FaceWindows, face_windows_of
+from geodesic_core.mesh.surface_curve import SurfaceCurve, curves_of
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import CUT_OFF, PIECE
 
@@ -39,11 +39,9 @@ RINGS = 2
 at first; where a border leads out of them, a second sweep looks farther."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Border:
-    """A polyline of points that are equally near to two sources, and no nearer to a third.
-
-    Between two of its points it lies in one face.
+@dataclass(frozen=True, eq=False, repr=False)
+class Border(SurfaceCurve):
+    """A curve of points that are equally near to two sources, and no nearer to a third.
 
     Examples
     --------
@@ -55,25 +53,10 @@ class Border:
 
     sources: tuple[int, int]
     """Indices into the sources of the field, the lower one first."""
-    points: Floats
-    """(K, 3) float64, mesh units"""
-    closed: bool
-    """True where the last point is joined to the first, which is not repeated."""
-    faces: Ints
-    """(K,) int32 of a closed line, (K - 1,) of an open one: the face behind each point."""
 
     def __repr__(self) -> str:
-        kind = "closed" if self.closed else "open"
         first, second = self.sources
-        return (
-            f"Border(sources {first} and {second}, {len(self.points)} points, {kind}, "
-            f"length {self.length:.6g})"
-        )
-
-    @property
-    def length(self) -> float:
-        """Sum of the distances between neighbouring points, mesh units."""
-        return length_of(np.vstack([self.points, self.points[:1]]) if self.closed else self.points)
+        return f"Border(sources {first} and {second}, {self.summary})"
 
 
 def swept_borders(
@@ -148,8 +131,7 @@ class _Drawing:
     def borders(self, control: Control) -> list[Border] | None:
         """Return the borders; None where they leave the faces whose windows are there."""
         control.check_memory(self._nbytes)
-        embedding, swept = self._mesh.embedding, self._swept
-        topology = embedding.topology
+        topology, swept = self._mesh.topology, self._swept
         mixed: Any = np.zeros(len(self.faces), np.bool_)
 
         def mix(first: int, last: int) -> int:
@@ -173,19 +155,24 @@ class _Drawing:
         def trace(first: int, last: int) -> int:
             nonlocal next_node
             found = trace_borders(
-                embedding, divided, labelled, near, 0.5 * self._chord_error, first, last, next_node
+                topology, divided, labelled, near, 0.5 * self._chord_error, first, last, next_node
             )
-            parts.append((found.points, *found.chains, found.sources))
+            parts.append((found.weights, *found.chains, found.sources))
             next_node = found.next_node
             control.check_memory(bytes_of(parts))
             return len(divided.faces)
 
         in_slices(len(divided.faces), trace, control.for_part(3, 4))
-        points, sizes, nodes, faces, sources = joined(parts)
-        chains = Chains(points, starts_of(sizes), nodes, faces)
-        lines, of_lines = link_borders(topology.links, labelled, chains, sources, next_node, near)
-        thin_lines(lines.points, lines.faces, lines.first, lines.closed, 0.5 * self._chord_error)
-        return self._borders(lines, of_lines)
+        weights, sizes, nodes, faces, sources = joined(parts)
+        chains = Chains(weights, starts_of(sizes), nodes, faces)
+        lines, of_lines = link_borders(topology, rank, labelled, chains, sources, next_node, near)
+        thin_lines(topology.geometry, lines, 0.5 * self._chord_error)
+        return [
+            Border(**vars(curve), sources=(lower, higher))
+            for curve, (lower, higher) in zip(
+                curves_of(self._mesh, lines), of_lines.tolist(), strict=True
+            )
+        ]
 
     def _divided(self, candidates: Ints, rank: Ints, control: Control) -> Territories | None:
         """Divide the candidates, and the neighbours that borders lead to; None as for `borders`.
@@ -218,19 +205,6 @@ class _Drawing:
             return None
         runs, runs_of, curves, curves_of = joined(parts)
         return Territories(faces, runs, starts_of(runs_of), curves, starts_of(curves_of))
-
-    def _borders(self, lines: Lines, sources: Ints) -> list[Border]:
-        first = lines.first.tolist()
-        bounds = zip(first[:-1], first[1:], lines.closed.tolist(), sources.tolist(), strict=True)
-        return [
-            Border(
-                sources=(lower, higher),
-                points=lines.points[lo:hi] + self._mesh.origin,
-                closed=bool(is_closed),
-                faces=self._mesh.topology.outer_face[lines.faces[lo : hi if is_closed else hi - 1]],
-            )
-            for lo, hi, is_closed, (lower, higher) in bounds
-        ]
 
 
 def _faces_of_several(mesh: TriangleMesh, nodes: Nodes, nearest: Ints) -> Flags:

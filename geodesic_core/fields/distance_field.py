@@ -1,7 +1,7 @@
 """Distance fields: the results of the solvers."""
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
@@ -21,7 +21,6 @@ from geodesic_core.fields.field_file import SHOWN, write_field_file
 from geodesic_core.fields.gradient import gradient_at_vertices
 from geodesic_core.fields.isolines import (
     Drawing,
-    Isoline,
     as_levels,
     resolve_chord_error,
     spaced_levels,
@@ -41,8 +40,10 @@ from geodesic_core.fields.sweep_result import (
 from geodesic_core.fields.sweeps import ExactSweep, MergingSweep, Sweep
 from geodesic_core.fields.transport import transported
 from geodesic_core.kernels.retained.face_windows import FaceWindows
+from geodesic_core.mesh.surface_curve import SurfaceCurve, draw_over
 from geodesic_core.mesh.surface_point import Point, Source, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.plotting import Camera
 from geodesic_core.reprs import as_table
 from geodesic_core.tolerances import CUT_OFF
 from geodesic_core.validation import as_angle, check_choice
@@ -211,14 +212,32 @@ class DistanceField:
         surface = self.mesh.to_pyvista()
         return plotting.with_distances(surface, self.distances, self.nearest_source)
 
-    def plot(self, screenshot: str | Path | None = None) -> None:
+    def plot(
+        self,
+        isolines: int | Sequence[float] = 0,
+        paths: Iterable[SurfaceCurve] = (),
+        points: Iterable[Point] = (),
+        *,
+        camera: Camera | None = None,
+        title: str | None = None,
+        save: str | Path | None = None,
+    ) -> None:
         """Draw the surface, coloured by distance: in a window, in a notebook, or into a file.
 
         Sources are marked. Unreachable parts are grey.
 
         Parameters
         ----------
-        screenshot
+        isolines
+            Levels of lines to draw, or how many, evenly spaced.
+        paths, points
+            Curves of any kind, and points, to draw as well.
+        camera
+            ``"iso"``, or the axis from which one looks: ``"+z"``, ``"-x"``…; by default ``"iso"``,
+            and the flat side of what is flat.
+        title
+            A line above the picture.
+        save
             A file to draw into, without a window: ``.png``, ``.jpg``, ``.tif`` or ``.bmp``.
 
         Raises
@@ -226,21 +245,34 @@ class DistanceField:
         MissingExtra
             PyVista is not installed; the extra ``plot`` brings it.
         InvalidArgument
-            The suffix is not that of a picture, or the file cannot be written.
+            The suffix is not that of a picture, the file cannot be written, or there is no such
+            camera.
 
         Examples
         --------
         >>> from pathlib import Path
         >>> from tempfile import mkdtemp
         >>> file = Path(mkdtemp()) / "field.png"
-        >>> gc.exact_distance(gc.samples.sphere(80), 0).plot(screenshot=file)
+        >>> field = gc.exact_distance(gc.samples.sphere(80), 0)
+        >>> field.plot(isolines=8, paths=[field.path_to(9)], title="From the pole", save=file)
         >>> file.exists()
         True
         """
-        with plotting.picture(screenshot, "DistanceField.plot") as plotter:
-            plotting.draw_distances(plotter, self.to_pyvista())
-            points = chain.from_iterable(self._sweep.question.polylines)
-            plotting.draw_points(plotter, np.array([self.mesh.position(each) for each in points]))
+        with plotting.picture(save, camera, title, "DistanceField.plot") as plotter:
+            plotting.draw_surface(plotter, self.to_pyvista())
+            if isinstance(isolines, int):
+                levels: Sequence[float] = self.levels(isolines).tolist() if isolines else []
+            else:
+                levels = isolines
+            lines = chain.from_iterable(self.isolines(levels) if len(levels) else [])
+            shown = [line.to_pyvista() for line in lines]
+            plotting.draw_lines(plotter, shown, plotting.ISOLINE, plotting.ISOLINE_WIDTH)
+            sources = self._sweep.question.polylines
+            places = [[self.mesh.position(point) for point in line] for line in sources]
+            curves = [plotting.line_of(np.array(each), "plot") for each in places if len(each) > 1]
+            plotting.draw_lines(plotter, curves, plotting.PATH, plotting.PATH_WIDTH)
+            alone = [line[0] for line in sources if len(line) == 1]
+            draw_over(self.mesh, plotter, paths, [*alone, *points])
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """Return `distances`, as numpy asks for them: ``numpy.asarray(field)``."""
@@ -487,16 +519,17 @@ class DistanceField:
         cancel: Callable[[], bool] | None = None,
         deadline_s: float | None = None,
         memory_limit: int | None = None,
-    ) -> list[list[Isoline]]:
+    ) -> list[list[SurfaceCurve]]:
         """Return for each level, in their order, the lines of points at that distance.
 
-        They bound the part of the surface within that distance: closed, or open where they end at
-        the boundary or at an edge of more than two faces. In each face they consist of circular
-        arcs, and of straight lines beside curves; their ends and crossings of edges are exact, and
-        between them arcs become chords. A vertex at the level itself counts as within. Levels
-        beyond all distances, or beyond ``max_distance``, have no lines. In an approximate field the
-        lines follow its own distances, and the same error bound holds. In a fast field the lines
-        are exact: they come from an exact sweep, whose windows it retains.
+        They bound the part of the surface within that distance, which is on their right. They are
+        closed, or open where they end at the boundary or at an edge of more than two faces. In each
+        face they consist of circular arcs, and of straight lines beside curves; their ends and
+        crossings of edges are exact, and between them arcs become chords. A vertex at the level
+        itself counts as within. Levels beyond all distances, or beyond ``max_distance``, have no
+        lines. In an approximate field the lines follow its own distances, and the same error bound
+        holds. In a fast field the lines are exact: they come from an exact sweep, whose windows it
+        retains.
 
         Parameters
         ----------
@@ -510,7 +543,7 @@ class DistanceField:
 
         Returns
         -------
-        list of list of Isoline
+        list of list of SurfaceCurve
             The lines of each level.
 
         Raises
@@ -536,7 +569,6 @@ class DistanceField:
         >>> len(near), near[0].closed, abs(near[0].length - 0.25 * np.pi) < 0.01
         (1, False, True)
         """
-        self.mesh.require_positions("an isoline")
         control = Control(progress, cancel, deadline_s, memory_limit)
         return list(
             self._isolines(as_levels(levels), resolve_chord_error(self.mesh, chord_error), control)
@@ -551,7 +583,7 @@ class DistanceField:
         cancel: Callable[[], bool] | None = None,
         deadline_s: float | None = None,
         memory_limit: int | None = None,
-    ) -> Iterator[list[Isoline]]:
+    ) -> Iterator[list[SurfaceCurve]]:
         """Yield the lines of `isolines` level by level, each drawn when the iterator reaches it.
 
         Parameters
@@ -563,7 +595,7 @@ class DistanceField:
 
         Yields
         ------
-        list of Isoline
+        list of SurfaceCurve
             The lines of the next level.
 
         Raises
@@ -579,7 +611,6 @@ class DistanceField:
         >>> [len(lines) for lines in field.each_isoline([0.5, 1.2, 9.0])]
         [1, 1, 0]
         """
-        self.mesh.require_positions("an isoline")
         control = Control(progress, cancel, deadline_s, memory_limit)
         return self._isolines(
             as_levels(levels), resolve_chord_error(self.mesh, chord_error), control
@@ -587,7 +618,7 @@ class DistanceField:
 
     def _isolines(
         self, levels: Sequence[float], chord_error: float, control: Control
-    ) -> Iterator[list[Isoline]]:
+    ) -> Iterator[list[SurfaceCurve]]:
         # At its very limit the sweep is cut off by rounding: a line stays clear of that.
         highest = self.max_distance * (1.0 - CUT_OFF)
         within = [min(level, highest) for level in levels if level <= self.max_distance]
@@ -777,7 +808,6 @@ class DistanceField:
         [(0, 1), (0, 2), (1, 2)]
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
-        self.mesh.require_positions("a border")
         error, exact = resolve_chord_error(self.mesh, chord_error), self._points.exact.value
         borders: list[Border] = []
         if len(self.sources) > 1:

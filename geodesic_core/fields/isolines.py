@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,54 +10,21 @@ from numpy.typing import NDArray
 from geodesic_core.arrays import Flags, Floats, Ints
 from geodesic_core.control import Control, in_slices
 from geodesic_core.errors import InvalidArgument
-from geodesic_core.fields.path import length_of
 from geodesic_core.fields.sources import Nodes
-from geodesic_core.kernels.curves.chains import Chains, Lines, link_crossing_chains
+from geodesic_core.kernels.curves.chains import Chains, link_crossing_chains
 from geodesic_core.kernels.curves.thinning import thin_lines
 from geodesic_core.kernels.front.state import FACE, NODE
 from geodesic_core.kernels.isolines.arc_chains import chain_arcs
 from geodesic_core.kernels.isolines.cuts import Cuts, bound_faces, cross_edges, cut_faces
 from geodesic_core.kernels.mesh.half_edges import LENGTH, LENGTH_LEFT, TAIL
 from geodesic_core.kernels.retained.face_windows import FaceWindows, RetainedSweep
+from geodesic_core.mesh.surface_curve import SurfaceCurve, curves_of
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import FINEST_CHORD, LEVEL, PIECE
 from geodesic_core.validation import is_index, is_number
 
 CHORD_SHARE = 1e-3
 """Share of the mean edge length that chords may stray from their arcs by default."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Isoline:
-    """A polyline of points at one distance; between two points it lies in one face.
-
-    Examples
-    --------
-    >>> mesh = gc.samples.plane(2)
-    >>> (line,) = gc.exact_distance(mesh, 0).isolines([0.5])[0]  # a quarter of a circle
-    >>> line.closed
-    False
-    >>> np.unique(np.linalg.norm(line.points, axis=1).round(9)).tolist()
-    [0.5]
-    >>> abs(line.length - 0.25 * np.pi) < 0.01
-    True
-    """
-
-    points: Floats
-    """(K, 3) float64, mesh units"""
-    closed: bool
-    """True where the last point is joined to the first, which is not repeated."""
-    faces: Ints
-    """(K,) int32 of a closed line, (K - 1,) of an open one: the face behind each point."""
-
-    def __repr__(self) -> str:
-        kind = "closed" if self.closed else "open"
-        return f"Isoline({len(self.points)} points, {kind}, length {self.length:.6g})"
-
-    @property
-    def length(self) -> float:
-        """Sum of the distances between neighbouring points, mesh units."""
-        return length_of(np.vstack([self.points, self.points[:1]]) if self.closed else self.points)
 
 
 def spaced_levels(distances: Floats, count: int) -> Floats:
@@ -218,7 +184,7 @@ class Drawing:
         for inside in (swept.site_ints, swept.segment_ints):
             np.minimum.at(least, inside[:, FACE], distances[inside[:, NODE]])
 
-    def lines(self, level: float, chord_error: float, control: Control) -> list[Isoline]:
+    def lines(self, level: float, chord_error: float, control: Control) -> list[SurfaceCurve]:
         """Return the lines of a level: O(F + n² log n) for n windows in each face that it passes.
 
         Raises
@@ -226,8 +192,7 @@ class Drawing:
         Cancelled, DeadlineExceeded, MemoryLimitExceeded
             As the control says; what the lines are drawn from counts as memory of the call.
         """
-        embedding, distances = self._mesh.embedding, self._swept.distance
-        topology = embedding.topology
+        topology, distances = self._mesh.topology, self._swept.distance
         slack = LEVEL * level
         passed = np.flatnonzero((self._least <= level + slack) & (self._most >= level - slack))
         if len(passed) == 0:
@@ -241,19 +206,19 @@ class Drawing:
         parts: list[Arrays] = []
 
         def chain(first: int, last: int) -> int:
-            points, chains = chain_arcs(
-                embedding, distances, cuts, crossings, level, 0.5 * chord_error, first, last
+            weights, chains = chain_arcs(
+                topology, distances, cuts, crossings, level, 0.5 * chord_error, first, last
             )
-            parts.append((points, *chains))
+            parts.append((weights, *chains))
             control.check_memory(bytes_of(parts))
             return len(cuts.faces)
 
         in_slices(len(cuts.faces), chain, control)
-        points, sizes, nodes, faces = joined(parts)
-        chains = Chains(points, starts_of(sizes), nodes, faces)
-        lines = link_crossing_chains(topology.links, crossings.half_edges, chains, PIECE * level)
-        thin_lines(lines.points, lines.faces, lines.first, lines.closed, 0.5 * chord_error)
-        return _isolines(self._mesh, lines)
+        weights, sizes, nodes, faces = joined(parts)
+        chains = Chains(weights, starts_of(sizes), nodes, faces)
+        lines = link_crossing_chains(topology, crossings.half_edges, chains, PIECE * level)
+        thin_lines(topology.geometry, lines, 0.5 * chord_error)
+        return curves_of(self._mesh, lines)
 
     def _cut(self, passed: Ints, level: float, rank: Ints, control: Control) -> Cuts:
         """Cut the faces that a level may pass: by their bounds, then neighbours that cuts lead to.
@@ -297,16 +262,3 @@ def starts_of(counts: NDArray[Any]) -> NDArray[Any]:
     starts = np.zeros(len(counts) + 1, counts.dtype)
     np.cumsum(counts, out=starts[1:])
     return starts
-
-
-def _isolines(mesh: TriangleMesh, lines: Lines) -> list[Isoline]:
-    first = lines.first.tolist()
-    bounds = zip(first[:-1], first[1:], lines.closed.tolist(), strict=True)
-    return [
-        Isoline(
-            points=lines.points[lo:hi] + mesh.origin,
-            closed=bool(is_closed),
-            faces=mesh.topology.outer_face[lines.faces[lo : hi if is_closed else hi - 1]],
-        )
-        for lo, hi, is_closed in bounds
-    ]

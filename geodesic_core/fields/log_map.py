@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
-from geodesic_core.errors import InvalidArgument, InvalidPoint
+from geodesic_core.errors import InvalidArgument, InvalidPoint, NoDirection
 from geodesic_core.fields.question import Question
 from geodesic_core.fields.straight_lines import lines_from
 from geodesic_core.fields.sweeps import DirectedSweep
@@ -179,10 +179,14 @@ def log_map_of(question: Question, control: Control, x_axis: Any, *, rescale: bo
 
     Raises
     ------
+    NoTangentPlane
+        The source has none.
     InvalidPoint
-        The source has no tangent plane, or no path leads to the target.
+        No path leads to the target.
+    NoDirection
+        The x axis has none.
     InvalidArgument
-        The x axis has no direction, or true angles do not fit into a plane.
+        True angles do not fit into a plane.
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As the control says.
     """
@@ -196,9 +200,7 @@ def log_map_of(question: Question, control: Control, x_axis: Any, *, rescale: bo
         )
     axis = 0.0 if x_axis is None else direction_of(mesh, source, as_vector("x_axis", x_axis))
     if math.isnan(axis):
-        raise InvalidArgument(
-            "x_axis has no direction on the surface: it is zero, or along the normal"
-        )
+        raise NoDirection("x_axis has no direction on the surface: it is zero, or along the normal")
     distances, angles, bends = _swept(question, control)
     inner, angles = mesh.topology.inner_vertex, frame.angles(angles)
     for node in question.nodes.targets:

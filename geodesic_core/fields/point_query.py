@@ -20,7 +20,6 @@ from geodesic_core.errors import InternalError
 from geodesic_core.fields.path import (
     EXACT,
     GeodesicPath,
-    reversed_path,
     rounding_of,
     traced_path,
 )
@@ -238,7 +237,7 @@ def find_nearest_source(
     def path() -> GeodesicPath:
         winners = winners_of(wave, np.zeros(len(wave.vertices.distance), np.int32))
         traced = traced_path(mesh, winners, nodes, int(nodes.targets[nearest]), EXACT)
-        return reversed_path(traced)
+        return traced.reversed()
 
     return NearestSource(nearest, float(totals[nearest]), path)
 

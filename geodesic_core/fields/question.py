@@ -13,7 +13,8 @@ from geodesic_core.control import Control
 from geodesic_core.fields.sources import Nodes, as_sources, component_of, each_of, nodes_of
 from geodesic_core.kernels.front.bounds import Bounds, with_parallel_windows
 from geodesic_core.mesh.curve import Polyline, polylines_from_arrays, polylines_to_arrays
-from geodesic_core.mesh.surface_point import Curve, Points, Source, Sources, SurfacePoint
+from geodesic_core.mesh.surface_curve import Sources
+from geodesic_core.mesh.surface_point import Curve, Points, Source, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
 

@@ -24,6 +24,7 @@ from geodesic_core.mesh.curve import (
     weights_by_face,
 )
 from geodesic_core.mesh.edge_lengths import flat_points
+from geodesic_core.mesh.surface_curve import SurfaceCurve, as_written
 from geodesic_core.mesh.surface_point import UNPLACED, Curve, Point, Points, Source, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.validation import is_number, unboxed
@@ -248,13 +249,16 @@ def as_sources(
     sources = unboxed(sources)
     if isinstance(sources, str | bytes):
         raise InvalidPoint(f"the source is {sources!r}; it must be a vertex index or a Source")
-    if isinstance(sources, Source | SurfacePoint | Curve) or not isinstance(sources, Iterable):
+    if isinstance(sources, Source | SurfacePoint | Curve | SurfaceCurve) or not isinstance(
+        sources, Iterable
+    ):
         sources = [sources]
     checked, polylines = [], []
     for i, item in enumerate(control.watched(sources)):
         source = item if isinstance(item, Source) else Source(item)
-        if isinstance(source.point, Curve):
-            polylines.append(polyline_of(mesh, source.point, f"source {i}", control))
+        if isinstance(source.point, Curve | SurfaceCurve):
+            curve = as_written(source.point)
+            polylines.append(polyline_of(mesh, curve, f"source {i}", control))
         else:
             polylines.append((mesh.point(source.point, f"source {i}"),))
         start = source.start_distance
@@ -301,6 +305,11 @@ def each_of(points: Points, name: str) -> Iterable[Point]:
             f"{name}s is {points!r}; it must be a point, or a sequence of points{remedy(points)}"
         )
     return points
+
+
+def as_given(points: Points, found: Any) -> Any:
+    """Return what was found of each of some points: by itself where one point was given."""
+    return found[0] if isinstance(unboxed(points), SurfacePoint | int | np.integer) else found
 
 
 def as_points(

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 
 from geodesic_core.arrays import Floats, Longs
 from geodesic_core.control import Control
-from geodesic_core.errors import InvalidArgument, InvalidPoint
-from geodesic_core.fields.path import EXACT, GeodesicPath, point_of
+from geodesic_core.errors import InvalidArgument, InvalidPoint, NoDirection, NoTangentPlane
+from geodesic_core.fields.path import EXACT, GeodesicPath
+from geodesic_core.kernels.mesh import locations
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
     COS_LEFT,
@@ -25,8 +26,7 @@ from geodesic_core.kernels.mesh.half_edges import (
     TAIL,
     point_in_frame,
 )
-from geodesic_core.kernels.paths import locations
-from geodesic_core.kernels.paths.locations import Locations
+from geodesic_core.kernels.mesh.locations import Locations
 from geodesic_core.kernels.paths.straight_lines import (
     ANGLE,
     AT_BOUNDARY,
@@ -52,6 +52,7 @@ from geodesic_core.kernels.paths.straight_lines import (
 )
 from geodesic_core.mesh.curve import weights_by_face
 from geodesic_core.mesh.frames import axis_of, base_of, direction_of, frame_at
+from geodesic_core.mesh.surface_curve import in_space, point_of, rows_of
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import WEIGHT
@@ -91,8 +92,7 @@ class StraightLine(GeodesicPath):
     no tangent plane"""
 
     def __repr__(self) -> str:
-        points = "1 point" if len(self._points) == 1 else f"{len(self._points)} points"
-        return f"StraightLine({points}, length {self.length:.6g}, stopped by {self.stopped})"
+        return f"StraightLine({self.summary}, stopped by {self.stopped})"
 
 
 def directions_from(
@@ -102,11 +102,12 @@ def directions_from(
 
     Raises
     ------
-    InvalidPoint
-        A start has no tangent plane.
+    NoTangentPlane
+        A start has none.
+    NoDirection
+        A vector has none on the surface.
     InvalidArgument
-        They are neither finite angles nor finite vectors, one or as many as starts; or a vector has
-        no direction on the surface.
+        They are neither finite angles nor finite vectors, one or as many as starts.
     """
     try:
         given = np.asarray(directions, np.float64)
@@ -121,13 +122,18 @@ def directions_from(
     given = np.broadcast_to(given, (count, 3) if are_vectors else (count,))
     angles = np.empty(count)
     for i, start in enumerate(starts):
+        try:
+            frame = frame_at(mesh, start)
+        except NoTangentPlane as error:
+            raise NoTangentPlane(str(error), i) from None
         angle = direction_of(mesh, start, given[i]) if are_vectors else given[i]
         if math.isnan(angle):
-            raise InvalidArgument(
+            raise NoDirection(
                 f"direction {i} is {given[i].tolist()}, which is zero, or along the normal at "
-                f"{start}: it has no direction on the surface"
+                f"{start}: it has no direction on the surface",
+                i,
             )
-        angles[i] = frame_at(mesh, start).kernel_angles(np.array(angle))
+        angles[i] = frame.kernel_angles(np.array(angle))
     return angles
 
 
@@ -255,7 +261,7 @@ def _as_paths(
     faces = np.empty(len(is_passed), np.int32)
     faces[is_passed] = mesh.topology.outer_face[trail.faces]
     faces[first[1:][inside] - 1] = mesh.topology.outer_face[ints[inside, HALF_EDGE] // 3]
-    points, directions = all_rows.points + mesh.origin, np.empty(len(starts))
+    in_its_space, directions = in_space(mesh, all_rows), np.empty(len(starts))
     directions[inside] = _directions_in_faces(mesh, ints[inside, HALF_EDGE], floats[inside])
     lines = []
     for i, (lo, hi) in enumerate(pairwise(first.tolist())):
@@ -266,14 +272,12 @@ def _as_paths(
         lines.append(
             StraightLine(
                 mesh=mesh,
-                _points=points[lo:hi],
                 faces=faces[lo + 1 : hi],
+                closed=False,
                 length=float(lengths[i] - (0.0 if stop == AT_LENGTH else floats[i, LEFT])),
+                located=rows_of(in_its_space, slice(lo, hi)),
                 error_bound=EXACT,
                 steps=None,
-                _location_faces=all_rows.faces[lo:hi],
-                _location_weights=all_rows.weights[lo:hi],
-                _location_vertices=all_rows.vertices[lo:hi],
                 stopped=_word(mesh, stop, end),
                 end_direction=float(directions[i]),
             )

@@ -10,14 +10,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats
 from geodesic_core.errors import InvalidArgument
+
+if TYPE_CHECKING:
+    from filelock import FileLock
 
 _QUESTION = "question.json"
 _DIGEST_BYTES = 16
@@ -37,7 +39,7 @@ class Blocks:
         """Return the blocks of an output file."""
         return cls(out.with_name(f".{out.name}.part"))
 
-    def open(self, question: Mapping[str, Any]) -> FileLock:
+    def open(self, question: Mapping[str, Any]) -> "FileLock":
         """Lock the folder, which is made where there is none; return the lock.
 
         Raises
@@ -46,6 +48,8 @@ class Blocks:
             It holds blocks of another question, another process works on it, or it cannot be
             written.
         """
+        from filelock import FileLock, Timeout
+
         self._check_writable()
         lock = FileLock(self.folder.with_suffix(".lock"))
         try:

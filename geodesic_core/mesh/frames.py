@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from geodesic_core.arrays import Floats
-from geodesic_core.errors import InvalidPoint
+from geodesic_core.errors import NoTangentPlane
 from geodesic_core.kernels.mesh.half_edges import (
     BOUNDARY,
     COS_LEFT,
@@ -111,8 +111,8 @@ def _beside(mesh: TriangleMesh, point: SurfacePoint) -> Frame:
     raise AssertionError("a face has an edge between its first two corners")
 
 
-def _without_plane(point: SurfacePoint, why: str) -> InvalidPoint:
-    return InvalidPoint(
+def _without_plane(point: SurfacePoint, why: str) -> NoTangentPlane:
+    return NoTangentPlane(
         f"{point} has no tangent plane, as {why}: directions have no meaning there; choose a point "
         "beside it"
     )
@@ -131,7 +131,7 @@ def direction_of(mesh: TriangleMesh, point: SurfacePoint, vector: Floats) -> flo
     """Return the direction of a vector in space, projected to the surface at a canonical point.
 
     Radians in the frame of the point; NaN where its projection has no direction. Raises
-    `InvalidArgument` where the surface is given by its lengths.
+    `NotEmbedded` where the surface is given by its lengths.
     """
     mesh.require_embedded("a direction")
     if point.vertex_index is not None:

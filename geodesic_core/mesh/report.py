@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats, Ints, Longs
-from geodesic_core.kernels.mesh.build import count_boundary_loops
+from geodesic_core.kernels.mesh.build import trace_boundary
 from geodesic_core.kernels.mesh.half_edges import (
     BOUNDARY,
     FANS,
@@ -127,8 +127,8 @@ class MeshReport:
     inconsistent_orientation: bool
     misoriented_edges: Sample
     """Edges that both of their faces traverse in the same direction, each by its vertices."""
-    bounds: tuple[tuple[float, ...], tuple[float, ...]]
-    """Lowest and highest corner of the bounding box, mesh units."""
+    bounds: tuple[tuple[float, ...], tuple[float, ...]] | None
+    """Lowest and highest corner of the bounding box, mesh units; None without positions."""
     mean_edge_length: float
     """Mesh units."""
 
@@ -198,6 +198,7 @@ def report_of(
         edge_lengths, first_used, seams = lengths[surface].reshape(-1)[sides], used, NO_SEAMS
     lowest = used[np.unique(topology.component[used], return_index=True)[1]]
     polygons = np.zeros(0) if face_map is None else np.bincount(face_map)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
     return MeshReport(
         vertices=len(vertices),
         faces=len(faces),
@@ -205,7 +206,7 @@ def report_of(
         triangulated_polygons=int(np.count_nonzero(polygons > 1)),
         components=len(lowest),
         component_vertices=Sample.of(np.sort(lowest)),
-        boundary_loops=int(count_boundary_loops(topology.links)),
+        boundary_loops=len(trace_boundary(topology.links)[1]) - 1,
         euler_characteristic=len(used) - len(edges) + len(surface),
         saddle_vertices=int(np.count_nonzero(flags & SADDLE)),
         boundary_vertices=int(np.count_nonzero(flags & BOUNDARY)),
@@ -224,7 +225,7 @@ def report_of(
         non_manifold_edges=Sample.of(edges[edge_faces > 2]),
         inconsistent_orientation=bool(same_way.any()),
         misoriented_edges=Sample.of(edges[same_way]),
-        bounds=(tuple(vertices.min(axis=0).tolist()), tuple(vertices.max(axis=0).tolist())),
+        bounds=None if np.isnan(low[0]) else (tuple(low.tolist()), tuple(high.tolist())),
         mean_edge_length=float(edge_lengths.mean()),
     )
 

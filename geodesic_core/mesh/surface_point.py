@@ -2,13 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.errors import InvalidPoint
 from geodesic_core.validation import is_index, is_number
+
+if TYPE_CHECKING:  # which is made of points
+    from geodesic_core.mesh.surface_curve import SurfaceCurve
 
 UNPLACED = -1
 """The face of a vertex that was named without a mesh, or belongs to no face."""
@@ -154,9 +157,9 @@ Points = Point | Sequence[Point] | NDArray[np.integer[Any]]
 class Curve:
     """A polyline on the surface; as a source, distances start at all of its points.
 
-    Each segment is straight, and lies in a face that both of its ends belong to. The `locations` of
-    a `GeodesicPath` make a curve. So to join points that are farther apart, find the
-    `shortest_path` with these points as waypoints. A closed curve ends where it begins.
+    Each segment is straight, and lies in a face that both of its ends belong to. To join points
+    that are farther apart, find the `shortest_path` with these points as waypoints: it is a
+    `SurfaceCurve`, which can be a source itself. A closed curve ends where it begins.
 
     Parameters
     ----------
@@ -181,7 +184,7 @@ class Source:
     Parameters
     ----------
     point
-        A vertex index, a `SurfacePoint` or a `Curve`.
+        A vertex index, a `SurfacePoint`, a `Curve` or a `SurfaceCurve`.
     start_distance
         Mesh units, finite, 0 or more; added to every distance from this source.
 
@@ -192,9 +195,5 @@ class Source:
     [0.5, 1.5, 1.5, 1.914]
     """
 
-    point: Point | Curve
+    point: "Point | Curve | SurfaceCurve"
     start_distance: float = 0.0
-
-
-Sources = Points | Curve | Source | Sequence[Point | Curve | Source]
-"""Every way to write the sources of a field"""

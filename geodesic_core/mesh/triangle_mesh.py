@@ -3,14 +3,15 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
-from typing import Any, Literal, NoReturn
+from pathlib import Path
+from typing import Any, Literal, NoReturn, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geodesic_core import plotting
 from geodesic_core.arrays import Floats, Ints, Longs
-from geodesic_core.errors import InvalidArgument, InvalidMesh, InvalidPoint
+from geodesic_core.errors import InvalidArgument, InvalidMesh, InvalidPoint, NotEmbedded
 from geodesic_core.kernels.mesh import build
 from geodesic_core.kernels.mesh.half_edges import (
     LENGTH,
@@ -22,6 +23,7 @@ from geodesic_core.kernels.mesh.half_edges import (
 )
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.mesh import canonical
+from geodesic_core.mesh.boundaries import boundaries_of
 from geodesic_core.mesh.closest_point import NearestFace
 from geodesic_core.mesh.degeneracies import (
     edges_of_no_length,
@@ -30,7 +32,9 @@ from geodesic_core.mesh.degeneracies import (
     of_three_vertices,
 )
 from geodesic_core.mesh.edge_lengths import as_edge_lengths
+from geodesic_core.mesh.height_field import HeightField
 from geodesic_core.mesh.report import NAMED, MeshReport, report_of, warnings_of
+from geodesic_core.mesh.surface_curve import SurfaceCurve, draw_over
 from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.tangent_frames import TangentFrames, tangent_frames_of
 from geodesic_core.mesh.triangulation import triangulated
@@ -41,9 +45,9 @@ from geodesic_core.mesh.validation import (
     check_corners,
     check_vertices,
 )
+from geodesic_core.plotting import Camera
 from geodesic_core.reprs import as_table
 from geodesic_core.tolerances import (
-    LARGEST_COORDINATE,
     ROUGH,
     ROUGH_VERTICES,
     ROUNDED_COORDINATE,
@@ -52,7 +56,7 @@ from geodesic_core.tolerances import (
     SNAP,
     WEIGHT_ERROR,
 )
-from geodesic_core.validation import as_barriers, as_limit, is_number, unboxed
+from geodesic_core.validation import as_barriers, as_limit, as_places, is_number, unboxed
 
 Merge = Literal["none", "exact"] | float
 """Which vertices become one: none, those at one position, or those within a distance."""
@@ -337,6 +341,11 @@ class TriangleMesh:
         TriangleMesh
             The same mesh, without preparing it again.
 
+        Raises
+        ------
+        InvalidArgument
+            There is a name that `arrays` does not give: for a mesh of your own use the constructor.
+
         Examples
         --------
         >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
@@ -344,6 +353,12 @@ class TriangleMesh:
         >>> gc.TriangleMesh.from_arrays(mesh.arrays())
         TriangleMesh(4 vertices, 2 faces)
         """
+        unknown = sorted(arrays.keys() - _ARRAYS)
+        if unknown:
+            raise InvalidArgument(
+                f"from_arrays does not know {', '.join(unknown)}: it takes what mesh.arrays() "
+                "returned; make a mesh of your own by TriangleMesh(vertices, faces)"
+            )
         mesh = cls.__new__(cls)
         mesh._hold(
             arrays["vertices"],
@@ -497,7 +512,7 @@ class TriangleMesh:
 
         Raises
         ------
-        InvalidArgument
+        NotEmbedded
             The mesh is given by lengths alone.
 
         Examples
@@ -505,9 +520,9 @@ class TriangleMesh:
         >>> gc.samples.plane(2).require_positions("a picture")
         """
         if not self.has_positions:
-            raise InvalidArgument(
-                f"{name} needs positions in space, and this mesh has lengths alone: make it by "
-                "TriangleMesh.from_lengths(faces, lengths, vertices)"
+            raise NotEmbedded(
+                f"{name} needs positions in space, and this mesh has lengths alone: give it "
+                "vertices as well"
             )
 
     def require_embedded(self, name: str) -> None:
@@ -520,7 +535,7 @@ class TriangleMesh:
 
         Raises
         ------
-        InvalidArgument
+        NotEmbedded
             The mesh is given by lengths.
 
         Examples
@@ -528,7 +543,7 @@ class TriangleMesh:
         >>> gc.samples.plane(2).require_embedded("a gradient")
         """
         if self.lengths is not None:
-            raise InvalidArgument(
+            raise NotEmbedded(
                 f"{name} is a vector in space, which a surface given by its lengths does not have: "
                 "use angles, as those of a log map"
             )
@@ -592,29 +607,43 @@ class TriangleMesh:
         return float(np.linalg.norm([axis.max() - axis.min() for axis in self.vertices.T]))
 
     @cached_property
-    def _nearest_face(self) -> NearestFace:
-        surface = np.flatnonzero(self.inner_face >= 0)
-        return NearestFace(self.vertices - self.origin, self.faces, surface)
+    def _surface(self) -> Longs:
+        """The faces that are part of the surface."""
+        return np.flatnonzero(self.inner_face >= 0)
 
-    def locate(self, position: ArrayLike, max_distance: float | None = None) -> SurfacePoint:
-        """Return the point of the surface nearest to a position.
+    @cached_property
+    def _nearest_face(self) -> NearestFace:
+        return NearestFace(self.vertices - self.origin, self.faces, self._surface)
+
+    @cached_property
+    def _height_field(self) -> HeightField:
+        return HeightField(self.vertices - self.origin, self.faces, self._surface)
+
+    @overload
+    def locate(
+        self, position: Sequence[float], max_distance: float | None = None
+    ) -> SurfacePoint: ...
+    @overload
+    def locate(self, position: ArrayLike, max_distance: float | None = None) -> Any: ...
+    def locate(self, position: ArrayLike, max_distance: float | None = None) -> Any:
+        """Return the point of the surface nearest to a position, or those nearest to several.
 
         Parameters
         ----------
         position
-            (3,) mesh units.
+            (3,) or (N, 3) mesh units.
         max_distance
             Largest distance of the surface, mesh units; None for no limit.
 
         Returns
         -------
-        SurfacePoint
+        SurfacePoint or list of SurfacePoint
             Canonical.
 
         Raises
         ------
         InvalidPoint
-            The position is not three finite numbers in the range that vertices may have, or the
+            A position is not three finite numbers in the range that vertices may have, or the
             surface is farther away than ``max_distance``.
         InvalidArgument
             The distance is not a number, 0 or more.
@@ -625,7 +654,7 @@ class TriangleMesh:
         -----
         A point within 1e-12 of the bounding box from a vertex or an edge counts as on it, and the
         surface may be as much beyond ``max_distance``: that is rounding. The first call builds a
-        search tree, O(F log F); each takes O(log F) in practice.
+        search tree, O(F log F); each position takes O(log F) in practice.
 
         Examples
         --------
@@ -633,29 +662,81 @@ class TriangleMesh:
 
         >>> str(mesh.locate([0.25, 0.5, 1.0]))
         'the point (0.5, 0.25, 0.25) of face 1'
+        >>> [point.face_index for point in mesh.locate([[0.25, 0.5, 1.0], [0.5, 0.25, 1.0]])]
+        [1, 0]
         """
         self.require_positions("locate")
-        try:
-            wanted = np.asarray(position, dtype=np.float64)
-        except (TypeError, ValueError):
-            wanted = np.empty(0)
-        if wanted.shape != (3,) or not (np.abs(wanted) <= LARGEST_COORDINATE).all():
-            raise InvalidPoint(
-                f"the position is {position!r}; it must be three finite numbers, at most "
-                f"{LARGEST_COORDINATE:g} in size (of several positions, locate one after another)"
-            )
+        places, is_one = as_places("position", position, 3)
         limit = as_limit(max_distance)
+        found = [self._located(place, limit, name) for name, place in places]
+        return found[0] if is_one else found
+
+    def _located(self, wanted: Floats, limit: float, name: str) -> SurfacePoint:
         face, point, distance = self._nearest_face(wanted - self.origin)
-        largest = float(np.abs(point + self.origin).max())
-        snap = max(SNAP * self.diagonal, ROUNDED_COORDINATE * largest)
+        snap = self._snap_at(point)
         if distance > limit + snap:
             raise InvalidPoint(
-                f"the nearest point of the surface is {distance:g} away from {wanted.tolist()}, "
-                f"which is more than max_distance = {limit:g}"
+                f"the nearest point of the surface is {distance:g} away from the {name}, "
+                f"{wanted.tolist()}, which is more than max_distance = {limit:g}"
             )
         corners = self.vertices[self.faces[face]] - self.origin
-        weights = canonical.weights_of(point, corners, snap)
-        return self._point_in_face(face, weights, "position")
+        return self._point_in_face(face, canonical.weights_of(point, corners, snap), name)
+
+    def _snap_at(self, point: Floats) -> float:
+        largest = float(np.abs(point + self.origin).max())
+        return max(SNAP * self.diagonal, ROUNDED_COORDINATE * largest)
+
+    @overload
+    def locate_xy(self, place: Sequence[float]) -> SurfacePoint: ...
+    @overload
+    def locate_xy(self, place: ArrayLike) -> Any: ...
+    def locate_xy(self, place: ArrayLike) -> Any:
+        """Return the point of a height field above or below a place in the plane, or several.
+
+        Parameters
+        ----------
+        place
+            (2,) or (N, 2) mesh units: x and y.
+
+        Returns
+        -------
+        SurfacePoint or list of SurfacePoint
+            Canonical.
+
+        Raises
+        ------
+        InvalidArgument
+            The surface is not a height over the plane: a face is upright or turned over, or it has
+            several heights at a place.
+        InvalidPoint
+            A place is not two finite numbers, or the surface is not there.
+        MissingExtra
+            libigl is not installed; the extra ``locate`` brings it.
+
+        Notes
+        -----
+        As `locate`.
+
+        Examples
+        --------
+        >>> slope = gc.TriangleMesh([[0, 0, 0], [4, 0, 4], [0, 4, 0]], [[0, 1, 2]])
+        >>> slope.position(slope.locate_xy([1.0, 2.0])).tolist()
+        [1.0, 2.0, 1.0]
+        """
+        self.require_positions("locate_xy")
+        places, is_one = as_places("place", place, 2)
+        found = [self._located_above(each, name) for name, each in places]
+        return found[0] if is_one else found
+
+    def _located_above(self, wanted: Floats, name: str) -> SurfacePoint:
+        away = wanted - self.origin[:2]
+        snap = self._snap_at(np.append(away, 0.0))
+        found = self._height_field(away, snap)
+        if found is None:
+            raise InvalidPoint(f"the surface is not above or below the {name}, {wanted.tolist()}")
+        face, point = found
+        corners = (self.vertices[self.faces[face]] - self.origin) * [1.0, 1.0, 0.0]
+        return self._point_in_face(face, canonical.weights_of(point, corners, snap), name)
 
     def point(self, point: Point, name: str = "point") -> SurfacePoint:
         """Return a point in its canonical form, the same to the bit for all spellings of it.
@@ -833,6 +914,31 @@ class TriangleMesh:
             lengths=self.lengths,
         )
 
+    def boundaries(self) -> list[SurfaceCurve]:
+        """Return the boundary of the surface as curves, longest first.
+
+        They run along boundary edges with the surface on their left, as its faces are wound. They
+        are closed, but for those that end at an edge of three faces or more. Where fans of faces
+        meet at a vertex, several pass it. Blocked faces are no part of the surface: their rim is a
+        boundary.
+
+        Returns
+        -------
+        list of SurfaceCurve
+            None for a surface without boundary.
+
+        Notes
+        -----
+        O(F).
+
+        Examples
+        --------
+        >>> (rim,) = gc.samples.plane(2).boundaries()
+        >>> rim.closed, rim.length, rim.points[:, :2].tolist()
+        (True, 4.0, [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+        """
+        return boundaries_of(self)
+
     def tangent_frames(self) -> TangentFrames:
         """Return a tangent plane at each vertex, in which angles on the surface become vectors.
 
@@ -907,6 +1013,51 @@ class TriangleMesh:
         self.require_positions("a picture")
         return plotting.surface_of(self.vertices, self.faces, "TriangleMesh.to_pyvista")
 
+    def plot(
+        self,
+        paths: Iterable[SurfaceCurve] = (),
+        points: Iterable[Point] = (),
+        *,
+        camera: Camera | None = None,
+        title: str | None = None,
+        save: str | Path | None = None,
+    ) -> None:
+        """Draw the surface: in a window, in a notebook, or into a file.
+
+        Parameters
+        ----------
+        paths, points
+            Curves of any kind, and points, to draw on it.
+        camera
+            ``"iso"``, or the axis from which one looks: ``"+z"``, ``"-x"``…; by default ``"iso"``,
+            and the flat side of what is flat.
+        title
+            A line above the picture.
+        save
+            A file to draw into, without a window: ``.png``, ``.jpg``, ``.tif`` or ``.bmp``.
+
+        Raises
+        ------
+        MissingExtra
+            PyVista is not installed; the extra ``plot`` brings it.
+        InvalidArgument
+            The suffix is not that of a picture, the file cannot be written, or there is no such
+            camera.
+
+        Examples
+        --------
+        >>> from pathlib import Path
+        >>> from tempfile import mkdtemp
+        >>> file = Path(mkdtemp()) / "mesh.png"
+        >>> mesh = gc.samples.plane(50)
+        >>> mesh.plot(mesh.boundaries(), [0], save=file)
+        >>> file.exists()
+        True
+        """
+        with plotting.picture(save, camera, title, "TriangleMesh.plot") as plotter:
+            plotting.draw_surface(plotter, self.to_pyvista())
+            draw_over(self, plotter, paths, points)
+
     def __repr__(self) -> str:
         blocked = f", {len(self.barriers)} of them blocked" if len(self.barriers) else ""
         return f"TriangleMesh({len(self.vertices)} vertices, {len(self.faces)} faces{blocked})"
@@ -917,6 +1068,12 @@ class TriangleMesh:
         if len(self.barriers):
             facts["blocked faces"] = len(self.barriers)
         return as_table("TriangleMesh", facts | {"memory": f"{self.nbytes / 1e6:.1f} MB"})
+
+
+_ARRAYS = {"vertices", "faces", "vertex_map", "face_map", "positions", "lengths"} | {
+    *Topology._fields
+}
+"""Names of the arrays of a mesh"""
 
 
 def _merging_distance(merge: Merge) -> float:

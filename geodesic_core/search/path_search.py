@@ -33,7 +33,6 @@ from geodesic_core.fields.path import (
     GeodesicPath,
     SearchStep,
     StepName,
-    length_on,
     located_path,
     rounding_of,
     traced_path,
@@ -62,6 +61,7 @@ from geodesic_core.kernels.front.state import (
 from geodesic_core.kernels.mesh.half_edges import LENGTH
 from geodesic_core.kernels.paths import edge_dijkstra, funnel
 from geodesic_core.mesh.curve import length_in_face
+from geodesic_core.mesh.surface_curve import length_on
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.landmarks import Landmarks

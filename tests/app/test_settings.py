@@ -130,8 +130,7 @@ def test_defaults_are_those_of_the_contract() -> None:
     assert settings.deadline_s == 120
     assert settings.workers == len(os.sched_getaffinity(0))
     assert (settings.rate_limit, settings.max_concurrent) == (None, None)
-    quotas = settings.quota_bytes, settings.quota_jobs, settings.quota_uploads
-    assert quotas == (None, None, None)
+    assert settings.quota_uploads is None
     assert (settings.api_keys, settings.cors_origins) == ((), ())
 
 
@@ -206,8 +205,6 @@ def test_variables_that_the_library_reads_are_no_mistakes(monkeypatch: pytest.Mo
         ("deadline_s", "nan"),
         ("rate_limit", "0"),
         ("max_concurrent", "-3"),
-        ("quota_bytes", "1 GiB"),
-        ("quota_jobs", "0"),
         ("quota_uploads", "-1"),
         ("store_evict", "on"),
         ("log_format", "logfmt"),

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import trimesh
 import uvicorn
 from fastapi import FastAPI
 from scipy.sparse import load_npz
@@ -99,20 +98,6 @@ def rows_of(name: str) -> list[dict[str, str]]:
     return list(csv.DictReader(Path(name).read_text().splitlines()))
 
 
-def test_distances_on_the_mesh(run: Run, plane: Path) -> None:
-    expected = gc.exact_distance(gc.load_mesh(plane), 0, 0.35).distances
-    args = ("--source", 0, "--max-distance", 0.35)
-    assert run("distance", plane, *args, "--out", "d.PLY").code == 0
-    mesh = trimesh.load("d.PLY", process=False)
-    assert mesh.faces.tolist() == gc.load_mesh(plane).faces.tolist()
-    assert mesh.metadata["_ply_raw"]["vertex"]["data"]["distance"].tolist() == expected.tolist()
-    assert run("distance", plane, *args, "--out", "d.csv").code == 0
-    rows = rows_of("d.csv")
-    reached = np.isfinite(expected)
-    assert [bool(row["distance"]) for row in rows] == reached.tolist()
-    assert [float(row["distance"]) for row in rows if row["distance"]] == expected[reached].tolist()
-
-
 @pytest.mark.slow
 def test_lines_in_each_format(run: Run, knot: Path) -> None:
     """What the formats hold is checked over HTTP: the encoders are the same."""
@@ -121,6 +106,8 @@ def test_lines_in_each_format(run: Run, knot: Path) -> None:
         "paths": ["--source", 3, "--target", 700, "--target", 20],
         "isolines": ["--source", 3, "--level", 2.5],
         "borders": ["--source", 3, "--source", 700],
+        "boundaries": ["--barriers", "3,40"],
+        "trace": ["--from", 3, "--direction", 0.5, "--direction", 2, "--length", 4],
     }
     for command, arguments in commands.items():
         for suffix in ("csv", "obj"):
@@ -155,13 +142,6 @@ def knot(run: Run) -> Path:
     """A curved mesh, on which windows merge."""
     assert run("sample", "knot", "--faces", 3000, "knot.ply").code == 0
     return Path("knot.ply")
-
-
-def test_exact_distances_have_no_error(run: Run, plane: Path) -> None:
-    for options in ([], ["--method", "exact"]):
-        ran = run("distance", plane, "--source", 0, *options, "--out", "d.json")
-        assert ran.figure("error bound") == "0.0 (relative, guaranteed)"
-        assert json.loads(Path("d.json").read_text())["error_bound"]["value"] == 0
 
 
 def test_path_writes_a_polyline_and_json(run: Run, plane: Path) -> None:
@@ -228,29 +208,6 @@ def test_a_path_by_way_of_others_tells_its_steps(run: Run, plane: Path) -> None:
     assert [step["faces"] for step in answer["steps"]] == [
         step.faces.tolist() for step in expected.steps
     ]
-
-
-@pytest.mark.slow
-def test_all_spellings_of_a_point_give_one_answer(run: Run, knot: Path) -> None:
-    mesh = gc.load_mesh(knot)
-    start, end = mesh.faces[900, :2].tolist()
-    at_start = ",".join(map(repr, mesh.vertices[start].tolist()))
-    one = ["--out", "d.json", "--source", "f40:0.2,0.3,0.5", "--source"]
-    answers, paths = set(), set()
-    for text in (start, f"v{start}", f"e{start}-{end}:0", f"e{end}-{start}:1", f"p{at_start}"):
-        assert run("distance", knot, *one, text).code == 0
-        answer = json.loads(Path("d.json").read_text())
-        answers.add(json.dumps(answer))
-        stops = ["--source", text, "--target", 7, "--via", "v30", "--via", text]
-        assert run("path", knot, *stops, "--out", "p.obj").code == 0
-        paths.add(Path("p.obj").read_text())
-    assert (len(answers), len(paths)) == (1, 1)
-    place = {"vertex": start, "position": mesh.vertices[start].tolist(), "start_distance": 0.0}
-    assert answer["sources"][1] == place
-    assert answer["sources"][0]["face"] == 40
-    assert answer["sources"][0]["barycentric"] == [0.2, 0.3, 0.5]
-    sources = [gc.SurfacePoint.face(40, (0.2, 0.3, 0.5)), start]
-    assert answer["distances"] == gc.exact_distance(mesh, sources).distances.tolist()
 
 
 def test_locate_prints_a_point_that_others_take(run: Run, knot: Path) -> None:
@@ -337,20 +294,6 @@ def test_matrices_are_the_library_s(run: Run, knot: Path, limit: float | None) -
     assert list(zip(*columns, strict=True)) == near
 
 
-def test_pairs(run: Run, knot: Path) -> None:
-    expected = gc.distance_matrix(gc.load_mesh(knot), [3, 9], [700, 20], layout="pairs")
-    ends = [*point_options("--source", 3, 9), *point_options("--target", 700, 20)]
-    for name in ("d.npy", "d.csv", "d.json"):
-        ran = run("matrix", knot, *ends, "--layout", "pairs", "--out", name)
-        assert ran.figure("reached") == "2 of 2 distances"
-    assert np.load("d.npy").tolist() == expected.tolist()
-    assert json.loads(Path("d.json").read_text())["distances"] == expected.tolist()
-    rows = [row.split(",") for row in Path("d.csv").read_text().splitlines()]
-    assert rows[0] == ["source", "target", "distance"]
-    found = [(int(i), int(j), float(d)) for i, j, d in rows[1:]]
-    assert found == [(i, i, d) for i, d in enumerate(expected.tolist())]
-
-
 def test_nearest_prints_candidates_as_they_were_written(run: Run, knot: Path) -> None:
     texts = ["700", "f40:0.2,0.3,0.5", "v20", "9"]
     places = [700, gc.SurfacePoint.face(40, (0.2, 0.3, 0.5)), 20, 9]
@@ -408,11 +351,6 @@ def test_a_path_stops_at_max_distance(run: Run, knot: Path, method: str) -> None
     assert beyond.code == 1
     assert "within --max-distance" in error_line(beyond)
     assert float(within.figure("length")) == pytest.approx(length, rel=1e-3)
-
-
-def test_a_path_to_its_own_source_is_a_point(run: Run, plane: Path) -> None:
-    assert run("path", plane, "--source", 7, "--target", 7, "--out", "p.obj").code == 0
-    assert Path("p.obj").read_text().splitlines()[-1] == "p 1"
 
 
 def test_merge_joins_a_cut_mesh(run: Run) -> None:
@@ -629,6 +567,7 @@ def test_what_fails_says_why_in_one_line(
         ("isolines plane.ply --source 0 --out l.obj", "give --count, or --level"),
         ("isolines plane.ply --source 0 --out l.obj --count 2 --level 1", "not both"),
         ("isolines plane.ply --source 0 --out l.obj --count 0", "--count"),
+        ("isolines plane.ply --out l.obj --count 1", "give --source at least once, or --values"),
         ("isolines plane.ply --source 0 --out l.npy --count 1", ".csv or .json"),
         ("path plane.ply --source 0 --target 1 --out p.obj --barriers 3;4", "'3;4' is not a list"),
         ("nearest plane.ply --source 0 --candidate 1 --barriers -3", "--barriers"),
@@ -661,6 +600,75 @@ def test_borders_are_drawn(run: Run, plane: Path) -> None:
     assert ran.out.count("border ") == len(expected) > 0
 
 
+def test_a_log_map_is_the_library_s(run: Run, plane: Path) -> None:
+    mesh = gc.load_mesh(plane)
+    for axis, looking in (("1,0.5,0", [1.0, 0.5, 0.0]), ("v60", 60)):
+        ran = run("log-map", plane, "--source", 3, "--x-axis", axis, "--out", "map.npy")
+        assert (ran.code, ran.err) == (0, "")
+        own = gc.log_map(mesh, 3, x_axis=looking)
+        columns = own.distances, own.angles, own.coordinates, own.bends
+        np.testing.assert_array_equal(np.load("map.npy"), np.column_stack(columns))
+    assert ran.figure("reached") == "121 of 121 vertices"
+    assert ran.figure("bent") == f"{(own.bends > 0).sum()} of 121 paths"
+    assert ran.figure("total angle") == repr(own.total_angle)
+    ran = run("log-map", plane, "--source", 60, "--true-angles", "--json")
+    own = gc.log_map(mesh, 60, rescale=False)
+    assert json.loads(ran.out)["coordinates"] == own.coordinates.tolist()
+
+
+def test_lines_go_straight_on(run: Run, plane: Path) -> None:
+    mesh = gc.load_mesh(plane)
+    start = ["--from", "v60"]
+    ran = run("trace", plane, *start, "--direction", "-1,0.5,0", "--length", 9, "--out", "t.json")
+    assert (ran.code, ran.err) == (0, "")
+    (line,) = json.loads(Path("t.json").read_text())["lines"]
+    own = gc.trace(mesh, 60, [-1.0, 0.5, 0.0], 9.0)
+    assert line["points"] == own.points.tolist()
+    assert f"{own.length!r} long" in ran.out
+    assert "stopped by boundary" in ran.out
+    many = [option for angle in (0, 1, 2) for option in ("--direction", angle)]
+    ran = run("trace", plane, *start, *many, "--length", 0.2, "--at-vertices", "stop", "--json")
+    found = json.loads(ran.out)["lines"]
+    expected = gc.trace(mesh, [60] * 3, [0.0, 1.0, 2.0], 0.2, at_vertices="stop")
+    assert [line["points"] for line in found] == [line.points.tolist() for line in expected]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("trace --from 60 --direction north --length 1", "'north' is neither an angle in radians"),
+        ("trace --from 60 --direction 1,0 --length 1", "'1,0' is neither an angle in radians"),
+        ("trace --from 60 --direction 0,0,1 --length 1", "--direction 0,0,1: direction 0 is [0.0"),
+        ("trace --from 999 --direction 1 --length 1", "--from 999: vertex 999 does not exist"),
+        ("trace --from 60 --direction 1 --length -1", "--length is -1.0"),
+        ("trace --from 60 --from 3 --direction 1 --length 1 --length 2 --length 3", "--from"),
+        ("log-map --source 60 --x-axis 0,0,1", "--x-axis: x_axis has no direction"),
+        ("log-map --source 60 --x-axis west", "west"),
+    ],
+)
+def test_directions_that_are_none(run: Run, plane: Path, arguments: str, message: str) -> None:
+    command, *rest = arguments.split()
+    ran = run(command, plane, *rest)
+    assert ran.code != 0
+    assert message in error_line(ran)
+
+
+def test_a_mesh_of_lengths_alone(run: Run) -> None:
+    np.savez("one.npz", faces=[[0, 1, 2]], lengths=[[3.0, 4.0, 5.0]])
+    assert run("info", "one.npz").figure("bounds") == "none"
+    assert run("distance", "one.npz", "--source", 0, "--out", "d.npy").code == 0
+    assert np.load("d.npy").tolist() == [0.0, 3.0, 5.0]
+    assert run("path", "one.npz", "--source", 0, "--target", 1).figure("length") == "3.0"
+    assert run("path", "one.npz", "--source", 0, "--target", 1, "--out", "p.csv").code == 0
+    for command, out in (
+        ("distance one.npz --source 0", "d.ply"),
+        ("locate one.npz --at 0,0,0", ""),
+    ):
+        ran = run(*command.split(), *(["--out", out] if out else []))
+        assert ran.code != 0
+        assert "lengths alone" in error_line(ran)
+
+
 def test_isolines_are_drawn(run: Run, plane: Path) -> None:
     field = gc.exact_distance(gc.load_mesh(plane), 60)
     for name in ("lines.obj", "lines.json"):
@@ -675,14 +683,6 @@ def test_isolines_are_drawn(run: Run, plane: Path) -> None:
     for level, lines in zip(drawn, expected, strict=True):
         assert [line["points"] for line in level["lines"]] == [i.points.tolist() for i in lines]
         assert [line["closed"] for line in level["lines"]] == [i.closed for i in lines]
-    rows = Path("lines.obj").read_text().splitlines()
-    groups = [row for row in rows if row.startswith("g")]
-    assert groups == ["g level_0.3", "g level_0.6"]
-    circle, *arcs = ([int(i) for i in row.split()[1:]] for row in rows if row.startswith("l"))
-    assert circle[0] == circle[-1] == 1
-    assert len(circle) - 1 == len(expected[0][0].points)
-    joined = [i for indices in (circle[:-1], *arcs) for i in indices]
-    assert joined == list(range(1, len(joined) + 1)), "each vertex in turn, and none twice"
     spaced = run("isolines", plane, "--source", 60, "--count", 2, "--out", "lines.json")
     assert spaced.out.count("level ") == 2
     rough = run(
@@ -690,6 +690,60 @@ def test_isolines_are_drawn(run: Run, plane: Path) -> None:
         *("--method", "approximate", "--chord-error", 0.01),
     )
     assert rough.figure("error bound") == "0.001 (relative, guaranteed)"
+
+
+def test_isolines_of_values_and_boundaries(run: Run, plane: Path) -> None:
+    mesh = gc.load_mesh(plane)
+    values = mesh.vertices[:, 0] - mesh.vertices[:, 1] ** 2
+    values[60:63] = np.nan
+    expected = gc.ScalarField(mesh, values).isolines([-0.25, 0.0])
+    np.save("v.npy", values)
+    cells = ["" if np.isnan(value) else repr(float(value)) for value in values]
+    Path("v.csv").write_text("vertex,value\n" + "".join(f"{i},{x}\n" for i, x in enumerate(cells)))
+    Path("v.txt").write_text("# heights\n" + "".join(f"{x or 'nan'}\n" for x in cells))
+    for name in ("v.npy", "v.csv", "v.txt"):
+        levels = "--level", -0.25, "--level", 0
+        ran = run("isolines", plane, "--values", name, *levels, "--out", "lines.json")
+        assert (ran.code, ran.err) == (0, "")
+        drawn = json.loads(Path("lines.json").read_text())["isolines"]
+        assert [[line["points"] for line in level["lines"]] for level in drawn] == [
+            [line.points.tolist() for line in lines] for lines in expected
+        ]
+    assert ran.figure("level       0.0").startswith(f": 0 closed, {len(expected[1])} open")
+    ran = run("boundaries", plane, "--barriers", "110", "--out", "rims.json")
+    own = mesh.with_barriers([110]).boundaries()
+    rims = json.loads(Path("rims.json").read_text())["boundaries"]
+    assert [rim["points"] for rim in rims] == [rim.points.tolist() for rim in own]
+    assert ran.out.count("boundary    closed, ") == len(own) == 2
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"1\n2 3\n", "line 2: '2 3' must be one number"),
+        (b"height\n1\n", "'height' has no column named value"),
+        (b"1\nup\n", "line 2: 'up' must be one number"),
+        (b"1\n2\n", "--values: the values have shape (2,)"),
+        (None, "cannot read v.txt"),
+    ],
+)
+def test_files_that_hold_no_values(
+    run: Run, plane: Path, content: bytes | None, words: str
+) -> None:
+    if content is not None:
+        Path("v.txt").write_bytes(content)
+    ran = run("isolines", plane, "--values", "v.txt", "--count", 2)
+    assert ran.code != 0
+    assert words in error_line(ran)
+
+
+def test_arrays_that_hold_no_values(run: Run, plane: Path) -> None:
+    np.save("v.npy", np.zeros((121, 2)))
+    for words in ("has the shape (121, 2)", "is no array of numpy's"):
+        ran = run("isolines", plane, "--values", "v.npy", "--count", 2)
+        assert ran.code != 0
+        assert words in error_line(ran)
+        Path("v.npy").write_bytes(b"no array")
 
 
 def test_barriers_are_in_the_way(run: Run, plane: Path) -> None:

@@ -59,18 +59,6 @@ def test_a_hyphen_prints_rows_and_the_summary_goes_to_standard_error(
     assert not Path("-").exists()
 
 
-@each_command
-def test_json_prints_the_answer_of_the_service(run: Run, plane: Path, command: str) -> None:
-    assert run(command, plane, *ASKED[command], "--out", "answer.json").code == 0
-    ran = run(command, plane, *ASKED[command], "--json")
-    assert ran.code == 0
-    printed, filed = json.loads(ran.out), json.loads(Path("answer.json").read_text())
-    for answer in (printed, filed):
-        answer.pop("stats", None)
-    assert printed == filed
-    assert "mesh  " in ran.err or "point  " in ran.err
-
-
 def test_json_goes_with_a_file(run: Run, plane: Path) -> None:
     ran = run("distance", plane, "--source", 0, "--json", "--out", "d.npy")
     assert json.loads(ran.out)["distances"] == np.load("d.npy").tolist()
@@ -180,7 +168,7 @@ def test_a_command_that_is_missing_shows_the_help(run: Run, group: list[str]) ->
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ("isolines plane.ply --source 0 --level -1", "--level is -1.0: it must be above 0"),
+        ("isolines plane.ply --source 0 --level -1", "--level: a distance must be greater than 0"),
         ("isolines plane.ply --source 0 --level nan", "--level is nan: it must be a finite numb"),
         (
             "isolines plane.ply --source 0 --count 1 --chord-error 0",

@@ -123,6 +123,23 @@ def test_isolines_matrices_and_candidates(
     assert [each.level for each in lines.levels] == [0.5, 1.0]
     assert lines.levels[0].lines[0].points.shape[1] == 3
 
+    values = same.vertices[:, 0].copy()
+    values[5] = np.nan
+    lines = service.isolines(mesh, values=values, levels=[0.0], include=["locations"])
+    (own,) = gc.ScalarField(same, values).isolines([0.0])
+    assert (lines.chord_error, lines.error_bound.value, len(own) > 0) == (0.0, 0.0, True)
+    for line, expected_line in zip(lines.levels[0].lines, own, strict=True):
+        np.testing.assert_array_equal(line.points, expected_line.points)
+        assert [at["face"] for at in line.locations] == [
+            at.face_index for at in expected_line.locations
+        ]
+
+    (rim,) = service.boundaries(mesh, barriers=[3])
+    (expected_rim,) = same.with_barriers([3]).boundaries()
+    np.testing.assert_array_equal(rim.points, expected_rim.points)
+    assert rim.vertices.tolist() == [at.vertex_index for at in expected_rim.locations]
+    assert (rim.closed, rim.locations) == (True, ())
+
     borders = service.borders(mesh, [0, 7, 9])
     expected = gc.exact_distance(same, [0, 7, 9]).borders()
     assert [line.sources for line in borders] == [line.sources for line in expected]
@@ -140,6 +157,23 @@ def test_isolines_matrices_and_candidates(
 
     near = service.nearest(mesh, 0, [7, 8, 9], k=2)
     assert [each.distance for each in near] == np.sort(table[0])[:2].tolist()
+
+
+def test_log_maps_and_lines_are_the_library_s(
+    service: Client, mesh: Mesh, same: gc.TriangleMesh
+) -> None:
+    found = service.log_map(mesh, 3, x_axis=9, max_distance=2.0)
+    expected_map = gc.log_map(same, 3, x_axis=9, max_distance=2.0)
+    for name in ("distances", "angles", "coordinates", "bends", "total_angle"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(expected_map, name))
+    for starts, directions in ((3, [0.1, 2.0]), ([3, 9], np.array([[1, 0, 0.5], [0, 1, 0]]))):
+        lines = service.trace(mesh, starts, directions, 1.5)
+        expected = gc.trace(same, np.resize(starts, 2).tolist(), directions, 1.5)
+        for line, own in zip(lines, expected, strict=True):
+            np.testing.assert_array_equal(line.points, own.points)
+            np.testing.assert_array_equal(line.faces, own.faces)
+            assert (line.length, line.stopped) == (own.length, own.stopped)
+            assert line.end_direction == own.end_direction
 
 
 def test_points_that_were_located_are_points(service: Client, mesh: Mesh) -> None:

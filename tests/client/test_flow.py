@@ -214,7 +214,7 @@ def test_a_busy_service_is_asked_again_when_it_says(
 
 
 def test_a_call_does_not_wait_for_hours(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As where the quota of jobs is reached: the first of them expires tomorrow."""
+    """As a proxy with limits of its own may ask it to."""
     waits: list[float] = []
     monkeypatch.setattr("tenacity.nap.time.sleep", waits.append)
     full = problem(429, "quota_exceeded", **{"Retry-After": "86000"})

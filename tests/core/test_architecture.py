@@ -8,12 +8,25 @@ import pytest
 
 from tests.support.paths import ROOT
 
-PARTS = ["compilation", "solvers", "matrices", "search", "fields", "io", "samples", "mesh"]
+PARTS = [
+    "compilation",
+    "solvers",
+    "matrices",
+    "cutting",
+    "search",
+    "fields",
+    "io",
+    "samples",
+    "mesh",
+]
 PARTS += ["plotting"]
 KERNELS = ["borders", "isolines", "retained", "curves", "paths", "sweep", "fast", "front"]
 MODULES = {f"geodesic_core.{part}": part for part in PARTS}
 MODULES |= {f"geodesic_core.kernels.{room}": room for room in KERNELS}
-MODULES |= {"geodesic_core.kernels.mesh": "half_edges"}
+MODULES |= {
+    "geodesic_core.kernels.cutting": "triangulations",
+    "geodesic_core.kernels.mesh": "half_edges",
+}
 
 Arrows = set[tuple[str, str]]
 

@@ -43,9 +43,22 @@ def public() -> Iterator[tuple[str, Callable[..., Any]]]:
 
 PUBLIC = dict(public())
 ROUTINES = [name for name, thing in PUBLIC.items() if inspect.isroutine(thing)]
-RECORDS = {"gc.DistanceField", "gc.ErrorBound", "gc.GeodesicPath", "gc.Isoline", "gc.MeshReport"}
+RECORDS = {
+    "gc.DistanceField",
+    "gc.ErrorBound",
+    "gc.GeodesicPath",
+    "gc.MeshReport",
+    "gc.SurfaceCurve",
+}
 RECORDS |= {"gc.MatrixFile", "gc.Nearest", "gc.Sample", "gc.SearchStep", "gc.SweepStats"}
-RECORDS |= {"gc.Border", "gc.LogMap", "gc.Polar", "gc.StraightLine", "gc.TangentFrames"}
+RECORDS |= {
+    "gc.Border",
+    "gc.CutMesh",
+    "gc.LogMap",
+    "gc.Polar",
+    "gc.StraightLine",
+    "gc.TangentFrames",
+}
 """Classes whose attributes are documented one by one: users read them, and make none."""
 
 

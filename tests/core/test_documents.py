@@ -44,6 +44,7 @@ ROOMS = [
     "fast.",
     "paths.",
     "curves.",
+    "cutting.",
     "retained.",
     "isolines.",
     "borders.",

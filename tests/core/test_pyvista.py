@@ -17,6 +17,7 @@ pytestmark = pytest.mark.file_slice(4)
 MESH = gc.samples.sphere(320)
 FIELD = gc.exact_distance(MESH, [0, 3], max_distance=1.5)
 PATH = gc.shortest_path(MESH, 0, 9)
+VALUES = gc.ScalarField(MESH, MESH.vertices[:, 2])
 
 
 def test_meshes_go_there_and_back() -> None:
@@ -54,21 +55,23 @@ def colours(file: Path) -> int:
     return len(np.unique(np.asarray(Image.open(file).convert("RGB")).reshape(-1, 3), axis=0))
 
 
-@pytest.mark.parametrize("thing", [FIELD, PATH], ids=["field", "path"])
+@pytest.mark.parametrize(
+    "thing", [FIELD, PATH, FIELD.mesh, VALUES], ids=["field", "path", "mesh", "values"]
+)
 @pytest.mark.jit
 @pytest.mark.slow
 def test_pictures_are_drawn_without_a_window(thing: Any, tmp_path: Path) -> None:
     file = tmp_path / "picture.png"
-    assert thing.plot(screenshot=file) is None
+    assert thing.plot(save=file) is None
     assert colours(file) > 100
-    thing.plot(str(tmp_path / "picture.JPG"))
+    thing.plot(save=str(tmp_path / "picture.JPG"), title="Here", camera="+z")
     assert colours(tmp_path / "picture.JPG") > 100
 
 
 @pytest.mark.slow
 @pytest.mark.jit
 def test_a_path_that_lost_its_surface_is_drawn_alone(tmp_path: Path) -> None:
-    copy.copy(PATH).plot(tmp_path / "path.png")
+    copy.copy(PATH).plot(save=tmp_path / "path.png")
     assert colours(tmp_path / "path.png") > 1
 
 
@@ -84,17 +87,17 @@ def test_without_a_file_a_plotter_shows_what_was_drawn(monkeypatch: pytest.Monke
 
 
 @pytest.mark.parametrize(
-    ("screenshot", "message"),
+    ("save", "message"),
     [
         ("picture.gif", "must end in .png, .jpg, .jpeg, .tif, .tiff or .bmp"),
         ("no/picture.png", "its folder does not exist"),
         (7, "it must be a string or a Path"),
     ],
 )
-def test_a_place_where_no_picture_can_be_written_is_refused(screenshot: Any, message: str) -> None:
+def test_a_place_where_no_picture_can_be_written_is_refused(save: Any, message: str) -> None:
     for thing in (FIELD, PATH):
         with pytest.raises(InvalidArgument, match=message):
-            thing.plot(screenshot)
+            thing.plot(save=save)
 
 
 def test_meshes_of_pyvista_have_an_accessor() -> None:

@@ -29,7 +29,7 @@ SHOWN: list[tuple[Any, str]] = [
     (gc.shortest_path(SQUARE, 1, 2), "GeodesicPath(3 points, length 1.41421, exact)"),
     (gc.shortest_path(SQUARE, 1, 1), "GeodesicPath(1 point, length 0, exact)"),
     (gc.Solver(SQUARE), "Solver(TriangleMesh(4 vertices, 2 faces))"),
-    (FIELD.isolines([0.5])[0][0], "Isoline("),
+    (FIELD.isolines([0.5])[0][0], "SurfaceCurve("),
 ]
 
 

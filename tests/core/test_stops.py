@@ -12,6 +12,7 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core import control
+from geodesic_core.cutting import retriangulation
 from geodesic_core.errors import Cancelled, DeadlineExceeded, InvalidArgument, MemoryLimitExceeded
 from geodesic_core.fields import fast_sweep, straight_lines, sweep
 from tests.support import zoo
@@ -21,6 +22,7 @@ pytestmark = [pytest.mark.jit, pytest.mark.slow, pytest.mark.slice(8)]
 
 INSIDE = gc.SurfacePoint.face(700, (0.2, 0.3, 0.5))
 CURVE = gc.Curve([gc.SurfacePoint.face(40, w) for w in ((0.2, 0.3, 0.5), (0.6, 0.3, 0.1))])
+CHORDS = [i / 64 for i in range(1, 64)]
 MANY = list(range(0, 2000, 200))
 TIGHT = {"relative_error": 1e-6}
 
@@ -28,6 +30,11 @@ TIGHT = {"relative_error": 1e-6}
 @cache
 def mesh() -> gc.TriangleMesh:
     return gc.TriangleMesh(*zoo.icosphere(4))
+
+
+def crossing_chords() -> list[gc.Curve]:
+    ends = [(gc.SurfacePoint.edge(40, 0, t), gc.SurfacePoint.edge(40, 1, t)) for t in CHORDS]
+    return [gc.Curve(pair) for pair in ends]
 
 
 def solver() -> gc.Solver:
@@ -55,6 +62,7 @@ SWEEPS = {
 }
 SWEEPS |= {
     "log map": lambda m, **watch: gc.log_map(m, INSIDE, x_axis=7, **watch),
+    "cut": lambda m, **watch: gc.cut(m, crossing_chords(), **watch),
     "lines": lambda m, **watch: gc.trace(m, MANY, np.arange(10.0), 300.0, **watch),
 }
 SEARCHES = {
@@ -119,6 +127,7 @@ def slices_by_number(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(module, "_FIRST_BUDGET", 2000)
     monkeypatch.setattr(control, "_FIRST_ITEMS", 8)
     monkeypatch.setattr(straight_lines, "_TRAIL", 100)
+    monkeypatch.setattr(retriangulation, "_BUDGET", 500)
 
 
 def bits(found: Any) -> Any:
@@ -127,11 +136,13 @@ def bits(found: Any) -> Any:
         near = int(np.argsort(found.distances)[50])
         counts = found.stats.as_dict() | {"seconds": 0.0}
         return [*map(bits, (found.distances, found.nearest_source, found.path_to(near))), counts]
+    if isinstance(found, gc.CutMesh):
+        return [*map(bits, (found.vertices, found.faces, found.edge_curves))]
     if isinstance(found, gc.LogMap):
         return [*map(bits, (found.distances, found.angles, found.bends))]
     if isinstance(found, gc.GeodesicPath):
         return answer(found)
-    if isinstance(found, gc.Isoline | gc.Border | gc.Nearest):
+    if isinstance(found, gc.SurfaceCurve | gc.Nearest):
         return [bits(part) for part in vars_of(found)]
     if isinstance(found, list | tuple):
         return [bits(part) for part in found]

@@ -24,6 +24,7 @@ pytestmark = pytest.mark.file_slice(5)
 
 PATH = np.array([230, 0, 92])
 BARRIER = np.array([30, 33, 40])
+WALK = np.array([37, 99, 235])
 
 
 def ramp_at(view: View, share: float, pixels: np.ndarray) -> np.ndarray:
@@ -542,6 +543,72 @@ def test_isolines_are_where_they_should_be(view: View, sphere: str) -> None:
     assert len(crossings) > 0
     assert all(np.abs(crossings - away).min() <= 2 for away in expected)
     assert all(np.abs(np.array(expected) - crossing).min() <= 4 for crossing in crossings)
+
+
+def test_rays_of_the_polar_grid_leave_the_source_evenly(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&{PLAIN}")
+    view.click(0, 0)
+    without = view.pixels()
+    view.page.check("#polar")
+    view.wait()
+    assert view.page.input_value("#lines") == "count", "circles as well"
+    view.page.select_option("#lines", "none")
+    view.wait()
+
+    turns = np.radians(np.arange(0, 360, 0.25))
+    away = 60  # farther on, some are no shortest paths: around a vertex it is shorter
+    x, y = view.centre[0] + away * np.cos(turns), view.centre[1] + away * np.sin(turns)
+    columns, rows = np.rint(x).astype(int), np.rint(y).astype(int)
+    is_ray = np.abs(view.pixels() - without).max(axis=2)[rows, columns] > 30
+    there = turns[is_ray]
+    starts = there[np.diff(there, prepend=there[-1] - 2 * math.pi) > 5 / away]  # pixels
+    assert len(starts) == 24
+    np.testing.assert_allclose(np.diff(starts), 2 * math.pi / 24, atol=2 / away)
+    assert query_of(view)["polar"] == ["1"]
+
+    view.page.uncheck("#polar")
+    view.wait()
+    assert np.abs(view.pixels() - without)[rows, columns].max() <= 8
+
+
+def test_a_straight_line_follows_the_pointer_and_tells_where_it_ends(
+    view: View, sphere: str
+) -> None:
+    view.open(f"/?mesh={sphere}&{PLAIN}")
+    view.click(-100, 0)
+    view.page.click("#tools >> text=Walk")
+    view.drag((-100, 0), (-60, 40), (60, 0))
+
+    turned = angle_at(view, 100) + angle_at(view, 60)
+    chord = 2 * math.sin(turned / 2)
+    told = view.text("#notes")
+    assert told.startswith("Straight on: ")
+    assert told.endswith("mesh units, as long as it was drawn.")
+    assert float(told.split()[2]) == pytest.approx(chord, rel=0.01)
+    line = seen(view, WALK)
+    ahead = line[:, 0].max() - 5  # the radius of the mark at the end
+    assert angle_at(view, ahead) == pytest.approx(chord - angle_at(view, 100), abs=0.03)
+    assert line[:, 0].min() < -85
+    assert np.abs(line[:, 1]).max() < 12
+
+    walk = np.array(query_of(view)["walk"][0].split(","), float)
+    view.page.fill("#walk", ", ".join(map(str, -walk)))
+    view.page.press("#walk", "Enter")
+    view.wait()
+    assert seen(view, WALK)[:, 0].max() < -80
+    view.page.click("#clear")
+    view.wait()
+    assert len(seen(view, WALK)) == 0
+
+
+def test_a_straight_line_ends_at_the_boundary(view: View, service: str) -> None:
+    view.open(f"/?mesh={sample(service, 'plane', 50)}&source=v0&walk=0.5,0.25,0&lines=none")
+    view.page.fill("#walk", "5, 2.5, 0")
+    view.page.press("#walk", "Enter")
+    view.wait()
+    assert (
+        view.text("#notes") == f"Straight on: {math.sqrt(1.25):.5f} mesh units, up to the boundary."
+    )
 
 
 def test_the_distance_under_the_pointer_is_told_in_the_unit_of_the_mesh(

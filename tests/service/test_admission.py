@@ -47,7 +47,9 @@ def limited(store: Path, **settings: Any) -> ServiceClient:
 # Keys
 
 
-@pytest.mark.parametrize("path", ["/", "/livez", "/readyz", "/openapi.json", "/problems/forbidden"])
+@pytest.mark.parametrize(
+    "path", ["/", "/livez", "/readyz", "/openapi.json", "/problems/unauthorized"]
+)
 def test_open_paths_need_no_key(keyed: TestClient, path: str) -> None:
     assert keyed.get(path).status_code == 200
     assert keyed.get(path, headers=bearer("wrong")).status_code == 200
@@ -82,7 +84,7 @@ def test_every_operation_needs_a_key_or_is_open(keyed: TestClient) -> None:
     assert document["security"] == [{"apiKey": []}, {}]
     for template, path in document["paths"].items():
         for method, operation in path.items():
-            url = template.replace("{code}", "forbidden")
+            url = template.replace("{code}", "unauthorized")
             has_passed = keyed.request(method, url).status_code != 401
             is_open = operation.get("security") == []
             assert has_passed == is_open, (method, template)
@@ -178,7 +180,7 @@ def test_without_keys_any_or_none_will_do(client: TestClient) -> None:
     assert client.get("/v1", headers=bearer("whatever")).status_code == 200
 
 
-def test_a_mesh_is_shared_but_its_owner_s_to_delete(keyed: TestClient) -> None:
+def test_all_keys_share_meshes(keyed: TestClient) -> None:
     alice, bob = bearer(ALICE), bearer(BOB)
     first = keyed.post("/v1/meshes", json=TWO_TRIANGLES, headers=alice)
     again = keyed.post("/v1/meshes", json=TWO_TRIANGLES, headers=bob)
@@ -188,23 +190,8 @@ def test_a_mesh_is_shared_but_its_owner_s_to_delete(keyed: TestClient) -> None:
 
     assert keyed.get(link, headers=bob).json() == first.json()
     assert "alice" not in first.text
-    problem = check_problem(keyed.delete(link, headers=bob), 403, "forbidden")
-    assert "alice" not in problem["detail"]
-    assert keyed.get(link, headers=bob).status_code == 200
-
-    assert keyed.delete(link, headers=alice).status_code == 204
-    check_problem(keyed.delete(link, headers=bob), 404, "mesh_not_found")
-    assert keyed.post("/v1/meshes", json=TWO_TRIANGLES, headers=bob).status_code == 201
     assert keyed.delete(link, headers=bob).status_code == 204
-
-
-def test_a_sample_has_an_owner_too(
-    keyed: TestClient,
-) -> None:
-    sample = {"sample": "plane", "faces": 50}
-    link = keyed.post("/v1/meshes", params=sample, headers=bearer(ALICE)).headers["location"]
-    check_problem(keyed.delete(link, headers=bearer(BOB)), 403, "forbidden")
-    assert keyed.delete(link, headers=bearer(ALICE)).status_code == 204
+    check_problem(keyed.delete(link, headers=alice), 404, "mesh_not_found")
 
 
 def test_openapi_declares_the_scheme(keyed: TestClient) -> None:
@@ -229,16 +216,6 @@ def test_rate_limit(tmp_path: Path) -> None:
     for _ in range(5):
         assert client.get("/livez").status_code == 200
         assert client.get("/readyz").status_code == 503
-
-
-def test_addresses_have_rates_of_their_own(tmp_path: Path) -> None:
-    app = create_app(Settings(store=tmp_path, workers=1, rate_limit=1))
-    one, other = (TestClient(app, client=(host, 1)) for host in ("10.0.0.1", "10.0.0.2"))
-
-    assert [one.get("/v1").status_code for _ in range(2)] == [200, 429]
-    forged = {"X-Forwarded-For": "10.9.9.9", "Forwarded": "for=10.9.9.9"}
-    assert one.get("/v1", headers=forged).status_code == 429
-    assert other.get("/v1").status_code == 200
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """Approximate answers: what they promise, and how they differ from exact ones."""
 
-import json
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,6 @@ import geodesic_core as gc
 from tests.support.service import check_problem, distances, stored_mesh, upload_sample
 
 ENDS = {"source": {"vertex": 3}, "target": {"vertex": 700}}
-WRITTEN_ENDS = "from=v3&to=v700"
 
 
 @pytest.fixture(scope="module")
@@ -40,22 +38,6 @@ def test_distances_are_the_library_s(client: TestClient, knot: str) -> None:
     assert answer["method"] == "approximate"
     assert answer["error_bound"] == {"type": "relative", "value": 0.002, "kind": "guaranteed"}
     assert answer["stats"]["windows_kept"] == field.stats.windows_kept
-
-
-@pytest.mark.parametrize("name", ["npy", "octets"])
-def test_headers_of_binary_distances(client: TestClient, knot: str, name: str) -> None:
-    body = {"sources": [{"vertex": 3}], "method": "approximate", "absolute_error": 0.5}
-    link = f"/v1/meshes/{knot}/distances"
-    answer = client.post(link, json=body).json()
-
-    response = client.post(link, params={"format": name}, json=body)
-
-    headers = response.headers
-    assert headers["geodesic-method"] == "approximate"
-    bound = {"type": "absolute", "value": 0.5, "kind": "guaranteed"}
-    assert json.loads(headers["geodesic-error-bound"]) == answer["error_bound"] == bound
-    values = np.frombuffer(response.content[-8 * len(answer["distances"]) :], "<f8")
-    np.testing.assert_array_equal(values, answer["distances"])
 
 
 # Kept results
@@ -113,29 +95,6 @@ def test_paths_are_the_library_s(client: TestClient, knot: str) -> None:
     }
 
 
-def test_get_answers_as_post_and_is_cached(client: TestClient, knot: str) -> None:
-    link = f"/v1/meshes/{knot}/path?{WRITTEN_ENDS}"
-    rough = f"{link}&method=approximate"
-
-    got = client.get(rough)
-
-    assert got.json() == path(client, knot, method="approximate").json()
-    assert client.get(rough, headers={"If-None-Match": got.headers["etag"]}).status_code == 304
-    for other in (link, f"{link}&method=exact", f"{link}&method=fast"):
-        response = client.get(other, headers={"If-None-Match": got.headers["etag"]})
-        assert response.status_code == 200
-        assert response.headers["etag"] != got.headers["etag"]
-
-
-def test_no_path_is_an_answer(client: TestClient, apart: str) -> None:
-    answer = client.get(f"/v1/meshes/{apart}/path?from=v0&to=v4&method=approximate").json()
-
-    assert answer["method"] == "approximate"
-    assert (answer["status"], answer["reason"]) == ("no_path", "disconnected")
-    assert answer["points"] is None
-    assert answer["error_bound"]["kind"] == "guaranteed"
-
-
 # Refusals
 
 REFUSED = [
@@ -169,20 +128,6 @@ def test_refused_errors(client: TestClient, knot: str, body: dict, names: list[s
         problem = check_problem(response, 422, "invalid_request")
         assert [fault["pointer"] for fault in problem["errors"]] == [f"/{name}" for name in names]
         assert problem["detail"].startswith(f"/{names[0]}: ")
-
-
-@pytest.mark.parametrize(
-    ("query", "name"),
-    [
-        ("method=heat", "method"),
-        ("method=approximate&relative_error=0.01", "relative_error"),
-    ],
-)
-def test_refused_errors_of_a_get(client: TestClient, knot: str, query: str, name: str) -> None:
-    response = client.get(f"/v1/meshes/{knot}/path?{WRITTEN_ENDS}&{query}")
-
-    problem = check_problem(response, 422, "invalid_request")
-    assert [fault["pointer"] for fault in problem["errors"]] == [f"/query/{name}"]
 
 
 def test_exact_refuses_an_error_with_a_reason(client: TestClient, knot: str) -> None:

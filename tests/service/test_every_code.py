@@ -97,7 +97,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         "query_memory_bytes": 50_000_000,
         "cancel_grace_s": LONG_S,
         "quota_uploads": 1,
-        "quota_bytes": 100_000_000,
+        "quota_results_bytes": 100_000,
         "allowed_hosts": ["testserver"],
     }
     with serving(store, **limits) as client:
@@ -119,6 +119,13 @@ def too_large(site: Site) -> Any:
     mesh_id = upload_sample(site.client, "knot", 30_000)
     lines = {"sources": [{"vertex": 0}], "count": 500}  # windows are kept for each level
     return site.client.post(f"/v1/meshes/{mesh_id}/isolines", json=lines)
+
+
+def without_positions(site: Site) -> Any:
+    triangle = {"faces": [[0, 1, 2]], "lengths": [[1, 1, 1]]}
+    made = site.client.post("/v1/meshes", json=triangle)
+    assert made.status_code < 300, made.text
+    return site.ask(made.json()["id"], sources=[{"position": [0, 0, 0]}])
 
 
 def limited(site: Site) -> Any:
@@ -233,7 +240,6 @@ PROVOKED: dict[str, Callable[[Site], Any]] = {
     "idempotency_key_unused": lambda site: site.ask(site.small, {"Idempotency-Key": "k"}),
     "malformed_request": on_a_connection(b"nonsense\r\n\r\n"),
     "unauthorized": lambda site: site.client.get("/v1", headers={"Authorization": "Bearer no"}),
-    "forbidden": lambda site: site.client.delete(f"/v1/meshes/{site.small}", headers=BOB),
     "origin_not_allowed": lambda site: site.client.post(
         "/v1/meshes", json=TWO_TRIANGLES, headers={"Origin": "https://evil.example"}
     ),
@@ -254,6 +260,7 @@ PROVOKED: dict[str, Callable[[Site], Any]] = {
     "invalid_request": lambda site: site.ask(site.small, colour="red"),
     "invalid_mesh": lambda site: site.client.post("/v1/meshes", json=BROKEN),
     "invalid_point": lambda site: site.ask(site.small, sources=[{"vertex": -1}]),
+    "not_embedded": without_positions,
     "limit_exceeded": lambda site: site.ask(site.small, sources=MANY),
     "memory_limit": too_large,
     "rate_limited": limited,
@@ -276,8 +283,8 @@ PROVOKED: dict[str, Callable[[Site], Any]] = {
 
 
 PROVOKED_OTHERWISE: dict[tuple[str, int], Callable[[Site], Any]] = {
-    ("quota_exceeded", 507): lambda site: site.client.post(  # beside 73 MB, 36 more
-        "/v1/meshes", params={"sample": "plane", "faces": 100_000}
+    ("quota_exceeded", 507): lambda site: site.ask(
+        site.slow, {**ASYNC, "Accept": "application/x-npy"}
     ),
 }
 """Provocations of statuses that are not the first of their code"""

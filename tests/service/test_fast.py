@@ -57,20 +57,6 @@ def test_the_usual_effort_is_2(client: TestClient, knot: str) -> None:
     assert spelt.headers["etag"] == bare.headers["etag"]
 
 
-def test_each_effort_has_a_result_of_its_own(client: TestClient, knot: str) -> None:
-    one = {"sources": [{"vertex": 42, "start_distance": 0.375}]}
-    rough = one | {"method": "approximate"}
-    bodies = [one, rough, *(one | {"method": "fast", "effort": effort} for effort in EFFORTS)]
-    first = [distances(client, knot, **body) for body in bodies]
-    again = [distances(client, knot, **body) for body in bodies]
-
-    assert len({response.headers["etag"] for response in first}) == len(bodies)
-    for fresh, kept in zip(first, again, strict=True):
-        assert "compute" in fresh.headers["server-timing"]
-        assert kept.headers["server-timing"] == "kept"
-        assert kept.content == fresh.content
-
-
 # Paths
 
 

@@ -19,8 +19,11 @@ OFFERED = {
     "paths": "json obj csv",
     "isolines": "json obj csv",
     "borders": "json obj csv",
+    "boundaries": "json obj csv",
     "matrix": "json npy octets csv",
     "nearest": "json csv",
+    "log-map": "json npy octets csv ply",
+    "trace": "json npy octets obj csv",
     "locate": "json csv",
 }
 BODIES: dict[str, dict[str, Any]] = {
@@ -29,12 +32,15 @@ BODIES: dict[str, dict[str, Any]] = {
     "paths": {"source": {"vertex": 0}, "targets": [{"vertex": 60}, {"vertex": 0}, {"vertex": 99}]},
     "isolines": {"sources": [{"vertex": 60}], "levels": [0.25, 0.5, 9.0]},
     "borders": {"sources": [{"vertex": 0}, {"vertex": 7}]},
+    "boundaries": {"barriers": [3]},
     "matrix": {"sources": [{"vertex": 0}, {"vertex": 7}], "targets": [{"vertex": 60}] * 3},
     "nearest": {
         "source": {"vertex": 0},
         "candidates": [{"vertex": 60}, {"face": 40, "barycentric": [0.2, 0.3, 0.5]}],
         "k": 2,
     },
+    "log-map": {"source": {"vertex": 0}, "max_distance": 5.0},
+    "trace": {"starts": [{"vertex": 0}], "directions": [0.5, 1.5], "lengths": [2.0, 0.0]},
     "locate": {"points": [[0.51, 0.32, 0.01], [0, 0, 7], [0, 0, 0]], "max_distance": 1.0},
 }
 MEDIA_TYPES = {

@@ -28,7 +28,7 @@ def isolines(client: TestClient, mesh_id: str, query: str = "", **body: Any) -> 
     return client.post(f"/v1/meshes/{mesh_id}/isolines{query}", json=request)
 
 
-def check_lines(found: list[dict[str, Any]], expected: list[gc.Isoline]) -> None:
+def check_lines(found: list[dict[str, Any]], expected: list[gc.SurfaceCurve]) -> None:
     assert len(found) == len(expected)
     for line, isoline in zip(found, expected, strict=True):
         assert line["closed"] is isoline.closed

@@ -2,9 +2,8 @@
 
 import errno
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from datetime import timedelta
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -14,9 +13,8 @@ from starlette.testclient import TestClient
 
 from app.jobs import Job, read_jobs
 from app.jobs.repository import JobRepository
-from app.jobs.retention import Retention
-from app.state import SqliteDatabase
-from tests.support.clocks import TEN_YEARS, Calendar, Clock
+from app.state import Database
+from tests.support.clocks import Clock
 from tests.support.processes import stopped
 from tests.support.service import (
     SLOW_FACES,
@@ -445,58 +443,6 @@ def test_jobs_are_forgotten_after_a_while(tmp_path: Path, monkeypatch: pytest.Mo
         wait_until(lambda: client.get(job).status_code == 404)
 
 
-@pytest.mark.parametrize("moved", [TEN_YEARS, -TEN_YEARS])
-def test_jobs_stay_as_long_as_ever_when_the_clock_is_moved(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moved: timedelta
-) -> None:
-    clock, calendar, due = Clock(), Calendar(), Retention.due
-    tidied = []
-
-    def due_noted(retention: Retention) -> Any:
-        tidied.append(retention)
-        return due(retention)
-
-    monkeypatch.setattr(Retention, "due", due_noted)
-    monkeypatch.setattr("app.jobs.retention.monotonic", clock)
-    for module in ("job", "retention"):
-        monkeypatch.setattr(f"app.jobs.{module}.datetime", calendar)
-    monkeypatch.setattr("app.jobs.runner._TIDY_PERIOD_S", 0.01)
-    with serving(tmp_path, job_ttl=60) as client:
-        mesh_id = upload_sample(client, "plane", 50)
-        jobs = [job_of(submit(client, mesh_id))]
-        wait_for(client, jobs[0], "successful")
-        calendar.moved = moved
-        jobs.append(job_of(submit(client, mesh_id)))
-        wait_for(client, jobs[1], "successful")
-
-        clock.now += 59
-        before = len(tidied)
-        wait_until(lambda: len(tidied) > before + 2)
-        for job in jobs:
-            assert client.get(f"{job}/results").status_code == 200
-        clock.now += 1
-        for job in jobs:
-            wait_until(lambda job=job: client.get(job).status_code == 404)
-
-
-def test_jobs_are_forgotten_although_the_disk_was_full(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    remove, refused = JobRepository.remove, []
-
-    async def remove_later(repository: JobRepository, job_id: str) -> None:
-        if len(refused) < 2:
-            refused.append(job_id)
-            raise OSError(errno.ENOSPC, "database or disk is full")
-        await remove(repository, job_id)
-
-    monkeypatch.setattr(JobRepository, "remove", remove_later)
-    with serving(tmp_path, job_ttl=0.1) as client:
-        job = job_of(submit(client, upload_sample(client, "plane", 50)))
-        wait_until(lambda: client.get(job).status_code == 404)
-    assert len(refused) == 2
-
-
 def test_the_end_of_a_job_is_recorded_once_the_disk_can_be_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -513,50 +459,11 @@ def test_the_end_of_a_job_is_recorded_once_the_disk_can_be_written(
     with serving(tmp_path) as client:
         job = job_of(submit(client, upload_sample(client, "plane", 50)))
         wait_until(lambda: refused)
-        assert {stored.status for stored in read_jobs(tmp_path / "jobs.sqlite3")} == {"accepted"}
+        (stored,) = read_jobs(Database(tmp_path / "jobs.sqlite3"))
+        assert stored.status == "accepted"
         is_read_only = False
         wait_for(client, job, "successful")
         assert client.get(f"{job}/results").status_code == 200
-
-
-@pytest.fixture
-def full_disk(monkeypatch: pytest.MonkeyPatch) -> Callable[[Path], None]:
-    """Fill the disk of a store, as its records of jobs see it, up to their reserve."""
-    run = SqliteDatabase._run
-
-    def fill(store: Path) -> None:
-        async def run_if_there_is_room(database: SqliteDatabase, sql: str, *values: Any) -> int:
-            if not sql.startswith("PRAGMA") and (store / "jobs.reserve").exists():
-                raise OSError(errno.ENOSPC, "database or disk is full")
-            return await run(database, sql, *values)
-
-        monkeypatch.setattr(SqliteDatabase, "_run", run_if_there_is_room)
-
-    return fill
-
-
-def test_jobs_are_dismissed_although_the_disk_is_full(
-    tmp_path: Path, full_disk: Callable[[Path], None], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with serving(tmp_path, cancel_grace_s=LONG_S) as client:
-        mesh_id = upload_sample(client, "plane", 50)
-        finished = [job_of(submit(client, mesh_id)) for _ in range(3)]
-        for job in finished:
-            wait_for(client, job, "successful")
-        with stopped(client.workers()):
-            running = job_of(submit(client, mesh_id))
-            full_disk(tmp_path)
-
-            for job in finished:
-                assert client.delete(job).status_code == 200
-                check_problem(client.get(job), 404, "job_not_found")
-            assert client.post(f"{running}/cancel").json()["status"] == "dismissed"
-            check_problem(submit(client, mesh_id), 507, "storage_full")
-    monkeypatch.undo()
-    with serving(tmp_path) as client:
-        (left,) = client.get("/v1/jobs").json()["jobs"]
-        assert f"/v1/jobs/{left['id']}" == running
-        assert left["status"] == "dismissed"
 
 
 def test_answers_of_jobs_outlive_those_that_are_only_kept(tmp_path: Path) -> None:

@@ -94,10 +94,6 @@ def test_refused_bodies(
     assert [fault["pointer"] for fault in problem["errors"]] == places
 
 
-def test_a_mesh_that_is_not_there(client: TestClient) -> None:
-    check_problem(locate(client, "0" * 32, points=[[0, 0, 0]]), 404, "mesh_not_found")
-
-
 def test_points_are_limited_by_the_size_of_their_answer(tmp_path: Path) -> None:
     with serving(tmp_path, max_json_values=20) as client:
         mesh_id = upload_sample(client, "plane", 100)

@@ -71,16 +71,6 @@ def test_no_path_has_a_reason_of_its_own(client: TestClient, apart: str, method:
     assert [path["target"]["vertex"] for path in found] == [4, 1, 0]
 
 
-@pytest.mark.usefixtures("one_replica")
-def test_the_same_paths_are_not_found_again(client: TestClient, knot: str) -> None:
-    first, again = (paths(client, knot, max_distance=9.5) for _ in range(2))
-
-    assert (again.content, again.headers["server-timing"]) == (first.content, "kept")
-    usual = paths(client, knot, method="approximate")
-    spelt = paths(client, knot, method="approximate", relative_error=0.001)
-    assert usual.headers["etag"] == spelt.headers["etag"] != first.headers["etag"]
-
-
 @pytest.mark.parametrize(
     ("change", "place"),
     [

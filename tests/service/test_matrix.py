@@ -191,23 +191,6 @@ def test_a_reason_for_each_that_is_missing(client: TestClient, apart: str, layou
     assert components == [[0, 0, 0, 1, 1, 1], [1, 1, 1, 0, 0, 0]]
 
 
-@pytest.mark.usefixtures("one_replica")
-def test_the_same_matrix_is_not_solved_again(client: TestClient, knot: str) -> None:
-    first, again = (matrix(client, knot, max_distance=3.25) for _ in range(2))
-
-    assert again.content == first.content
-    assert again.headers["server-timing"] == "kept"
-    assert again.headers["cache-control"] == "no-store"
-    others = [
-        matrix(client, knot, max_distance=3.5),
-        matrix(client, knot, max_distance=3.25, layout="sparse"),
-        matrix(client, knot, "?format=npy", max_distance=3.25),
-        matrix(client, knot, max_distance=3.25, targets=TARGETS[::-1]),
-    ]
-    tags = {response.headers["etag"] for response in [first, *others]}
-    assert len(tags) == 5
-
-
 @pytest.mark.parametrize(
     ("layout", "formats"),
     [("dense", ["npz"]), ("pairs", ["npz"]), ("sparse", ["npy", "octets"])],
@@ -221,13 +204,6 @@ def test_formats_that_do_not_hold_a_layout(
         check_problem(response, 406, "not_acceptable")
     response = matrix(client, knot, headers={"Accept": "text/html"}, layout=layout, targets=targets)
     check_problem(response, 406, "not_acceptable")
-
-
-def test_get_is_not_allowed(client: TestClient, knot: str) -> None:
-    for operation in ("matrix", "nearest", "paths"):
-        response = client.get(f"/v1/meshes/{knot}/{operation}")
-        check_problem(response, 405, "method_not_allowed")
-        assert response.headers["allow"] == "POST"
 
 
 @pytest.mark.parametrize(

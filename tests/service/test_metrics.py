@@ -190,22 +190,6 @@ def test_jobs_are_those_of_before_while_the_database_is_away(
     assert value(away, "requests_total", operation="getJob", status="503") == 1
 
 
-def test_each_replica_counts_scrapes_itself_so_that_they_need_no_database(
-    postgres: Postgres, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("app.http.middleware.rate_limits.monotonic", lambda: 1000.0)
-    limits = {"rate_limit": 2, "max_concurrent": 2}
-    with serving(tmp_path, state=postgres.new_database(), **limits) as client:
-        postgres.stop()
-        try:
-            check_problem(client.get("/v1"), 503, "state_unavailable")
-            scrape(client)
-            scrape(client)
-            check_problem(client.get("/metrics"), 429, "rate_limited")
-        finally:
-            postgres.start()
-
-
 def test_workers_that_are_lost(watched: ServiceClient) -> None:
     before = scrape(watched)
     os.kill(min(watched.workers()), signal.SIGKILL)

@@ -36,11 +36,13 @@ MORE_SEEDS: Mapping[str, tuple[Any, ...]] = {
         },
     ),
     "computeIsolines": (
+        {"values": [0.5, None, -1], "levels": [0], "include": ["locations"]},
         {"sources": [{"vertex": 0}], "count": 5, "method": "approximate", "absolute_error": 0.1},
     ),
     "computeBorders": (
         {"sources": [{"vertex": 0}, {"vertex": 9}], "chord_error": 0.01, "barriers": [7]},
     ),
+    "computeBoundaries": ({"barriers": [7], "include": ["locations"]},),
     "computePath": ({"source": {"vertex": 0}, "target": {"vertex": 9}, "max_distance": 9},),
     "computePathSteps": ({"source": 0, "target": 9, "waypoints": [7], "barriers": [5]},),
     "computePaths": (
@@ -58,6 +60,19 @@ MORE_SEEDS: Mapping[str, tuple[Any, ...]] = {
         {
             "source": {"vertex": 0},
             "candidates": [{"vertex": 9}, {"face": 3, "barycentric": [1, 0, 0]}],
+        },
+    ),
+    "computeLogMap": (
+        {"source": 0, "x_axis": {"vertex": 9}, "rescale": False, "max_distance": 0.5},
+        {"source": {"edge": [0, 1], "t": 0.5}, "x_axis": [1, 0, 0], "barriers": [7]},
+    ),
+    "traceLines": (
+        {
+            "starts": [{"vertex": 7}, {"face": 3, "barycentric": [0.2, 0.3, 0.5]}],
+            "directions": [[1, 0, 0], [0, 1, 0]],
+            "lengths": [0.5],
+            "at_vertices": "stop",
+            "barriers": [7],
         },
     ),
     "locatePoints": ({"points": [[0.5, 0.5, 1]], "max_distance": 0.5},),
@@ -177,7 +192,9 @@ def check_place(problem: Any, sent: Sent) -> None:
     for fault in faults:
         if not fault["pointer"].startswith(("/header/", "/query/")):
             assert sent.body is not None
-            is_missing = fault["message"].startswith(("Field required", "give levels"))
+            is_missing = fault["message"].startswith(
+                ("Field required", "give levels", "give sources, or values")
+            )
             assert is_there(json.loads(sent.body), fault["pointer"]) != is_missing, fault
 
 

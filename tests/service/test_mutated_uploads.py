@@ -49,7 +49,10 @@ def expected(name: str, data: bytes) -> gc.TriangleMesh | InvalidMesh | ProblemE
     """Return what the library makes of a file."""
     try:
         if name == "json":
-            return gc.TriangleMesh(*read_json_mesh(data))
+            faces, vertices, lengths = read_json_mesh(data)
+            if lengths is not None:
+                return gc.TriangleMesh.from_lengths(faces, lengths, vertices)
+            return gc.TriangleMesh(vertices, faces)
         return gc.load_mesh(data, type_of(name), max_faces=5_000_000)
     except (InvalidMesh, ProblemError) as error:
         return error

@@ -239,15 +239,3 @@ def test_the_largest_distance_is_that_of_the_whole_path(client: TestClient, plan
 
     assert found["length"] == length
     assert (missed["status"], missed["reason"]) == ("no_path", "beyond_max_distance")
-
-
-@pytest.mark.parametrize("limit", [-1, "nan", "much"])
-def test_largest_distances_that_are_none(client: TestClient, plane: str, limit: object) -> None:
-    link = f"/v1/meshes/{plane}/path"
-
-    posted = client.post(link, json={**ENDS, "max_distance": limit})
-    got = client.get(link, params={"from": "v0", "to": "v60", "max_distance": limit})
-
-    for response, place in ((posted, "/max_distance"), (got, "/query/max_distance")):
-        problem = check_problem(response, 422, "invalid_request")
-        assert [fault["pointer"] for fault in problem["errors"]] == [place]

@@ -169,6 +169,10 @@ def test_numbers_that_are_not_finite(client: TestClient, plane: str, number: str
         f'{{"sources": [{{"vertex": 0, "start_distance": {number}}}]}}',
         f'{{"sources": [{{"vertex": 0}}], "max_distance": {number}}}',
         f'{{"sources": [{{"vertex": {number}}}]}}',
+        f'{{"sources": [{{"edge": [0, 1], "t": {number}}}]}}',
+        f'{{"sources": [{{"face": 0, "barycentric": [1, 0, {number}]}}]}}',
+        f'{{"sources": [{{"position": [0, {number}, 0]}}]}}',
+        f'{{"sources": [{{"position": [0, 0, 0], "max_distance": {number}}}]}}',
     ):
         response = client.post(
             f"/v1/meshes/{plane}/distances",
@@ -242,20 +246,6 @@ def test_of_a_parameter_that_is_given_again_the_last_counts(client: TestClient, 
     answer = client.get(link).json()
     assert answer["source"]["vertex"] == 5
     assert [point["vertex"] for point in answer["waypoints"]] == [7, 8]
-
-
-def test_formats_that_there_are_not(client: TestClient, plane: str) -> None:
-    response = distances(client, plane, {"Accept": "text/html"})
-    check_problem(response, 406, "not_acceptable")
-
-    response = client.post(
-        f"/v1/meshes/{plane}/distances?format=xml", json={"sources": [{"vertex": 0}]}
-    )
-    check_problem(response, 422, "invalid_request")
-
-    response = distances(client, plane, NPY, include=["nearest_source"])
-    problem = check_problem(response, 422, "invalid_request")
-    assert problem["errors"][0]["pointer"] == "/include"
 
 
 def test_limits_of_queries(tmp_path: Path) -> None:

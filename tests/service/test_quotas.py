@@ -1,17 +1,15 @@
 """Quotas: a caller that has as much as it may is refused, and the others are served."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import pytest
 from starlette.testclient import TestClient
 
-from tests.support.clocks import TEN_YEARS, Calendar, Clock
 from tests.support.processes import stopped
-from tests.support.service import ServiceClient, check_problem, serving, upload_sample
+from tests.support.service import ServiceClient, check_problem, serving
 from tests.support.waiting import LONG_S, wait_until
 
 ALICE, BOB = ({"Authorization": f"Bearer {name}-0123456789abc"} for name in ("alice", "bob"))
@@ -33,31 +31,6 @@ def upload(client: TestClient, caller: Any, faces: int) -> Any:
 
 def limits_of(client: TestClient, caller: Any) -> Any:
     return client.get("/v1", headers=caller).json()["limits"]
-
-
-def test_stored_meshes(tmp_path: Path) -> None:
-    quota = 120_000
-    with keyed(tmp_path, quota_bytes=quota) as client:
-        assert limits_of(client, ALICE)["quota_bytes"] == quota
-        own = upload(client, ALICE, 200)
-        assert own.status_code == 201
-        refused = upload(client, ALICE, 242)
-        problem = check_problem(refused, 507, "quota_exceeded")
-        assert problem["limit"] == quota < problem["actual"]
-        assert problem["setting"] == "quota_bytes"
-        assert problem["hint"]
-        assert "retry-after" not in refused.headers
-        assert upload(client, ALICE, 200).status_code == 200, "it is stored already"
-
-        of_bob = upload(client, BOB, 242)
-        assert of_bob.status_code == 201
-        assert upload(client, ALICE, 242).status_code == 200, "it is Bob's, and counts for him"
-        check_problem(upload(client, BOB, 288), 507, "quota_exceeded")
-
-    with keyed(tmp_path, quota_bytes=quota) as client:
-        check_problem(upload(client, ALICE, 288), 507, "quota_exceeded")
-        client.delete(own.headers["location"], headers=ALICE)
-        assert upload(client, ALICE, 288).status_code == 201
 
 
 def test_uploads_at_once(tmp_path: Path) -> None:
@@ -96,70 +69,6 @@ def test_without_keys_uploads_at_once_are_counted_by_address(tmp_path: Path) -> 
         assert (first.result().status_code, second.result().status_code) == (201, 201)
 
 
-class Asker:
-    """Submits jobs, each a question that was not asked before."""
-
-    def __init__(self, client: ServiceClient) -> None:
-        self.client = client
-        with_key = {"params": {"sample": "plane", "faces": 200}, "headers": ALICE}
-        self.link = client.post("/v1/meshes", **with_key).headers["location"]
-        self.asked = 0
-
-    def submit(self, caller: Any, key: str | None = None) -> Any:
-        self.asked += 1
-        headers = {**caller, **ASYNC, **({"Idempotency-Key": key} if key else {})}
-        start = 1.0 if key else float(self.asked)
-        body = {"sources": [{"vertex": 0, "start_distance": start}]}
-        return self.client.post(f"{self.link}/distances", json=body, headers=headers)
-
-    def wait_for_end(self, job: str, caller: Any) -> None:
-        get: Callable[[], Any] = lambda: self.client.get(job, headers=caller).json()  # noqa: E731
-        wait_until(lambda: get()["status"] == "successful")
-
-
-def test_jobs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    clock, calendar = Clock(), Calendar()
-    monkeypatch.setattr("app.jobs.retention.monotonic", clock)
-    for module in ("job", "retention"):
-        monkeypatch.setattr(f"app.jobs.{module}.datetime", calendar)
-    with keyed(tmp_path, quota_jobs=2, job_ttl=86_400) as client, ThreadPoolExecutor(4) as pool:
-        assert limits_of(client, ALICE)["quota_jobs"] == 2
-        asker = Asker(client)
-        with stopped(client.workers()):
-            first = asker.submit(ALICE, "first")
-            at_once = sorted(
-                pool.map(asker.submit, [ALICE] * 4), key=lambda response: response.status_code
-            )
-            assert [response.status_code for response in at_once] == [202, 429, 429, 429]
-            second, refused = at_once[:2]
-            problem = check_problem(refused, 429, "quota_exceeded")
-            assert (problem["limit"], problem["actual"]) == (2, 3)
-            assert problem["setting"] == "quota_jobs"
-            assert problem["hint"]
-            assert refused.headers["retry-after"] == "1"
-            again = asker.submit(ALICE, "first")
-            assert again.headers["location"] == first.headers["location"], "it is no other job"
-            of_bob = asker.submit(BOB)
-            assert of_bob.status_code == 202
-
-        for response, caller in ((first, ALICE), (second, ALICE), (of_bob, BOB)):
-            asker.wait_for_end(response.headers["location"], caller)
-        refused = asker.submit(ALICE)
-        check_problem(refused, 429, "quota_exceeded")
-        assert refused.headers["retry-after"] == "86400"
-        clock.now += 23 * 3600
-        for calendar.moved in (TEN_YEARS, -TEN_YEARS):
-            assert asker.submit(ALICE).headers["retry-after"] == "3600"
-
-    with keyed(tmp_path, quota_jobs=2, job_ttl=86_400) as client:
-        asker = Asker(client)
-        refused = asker.submit(ALICE)
-        check_problem(refused, 429, "quota_exceeded")
-        assert refused.headers["retry-after"] == "86400", "ten years ago nothing had ended"
-        assert client.delete(second.headers["location"], headers=ALICE).status_code == 200
-        assert asker.submit(ALICE).status_code == 202
-
-
 def test_answers_to_jobs_of_one_caller_leave_room_for_those_of_another(tmp_path: Path) -> None:
     """Alice fills what she may have; the next job is refused before any work, and Bob's is not."""
     with keyed(tmp_path, results_bytes=100_000, results_memory_bytes=1) as client:
@@ -181,15 +90,3 @@ def test_answers_to_jobs_of_one_caller_leave_room_for_those_of_another(tmp_path:
         assert problem["limit"] == 50_000 < problem["actual"]
         assert client.app.state.service.answering.solves["distances"] == solved
         run(BOB, 4)
-
-
-def test_without_keys_all_that_is_stored_has_one_owner(tmp_path: Path) -> None:
-    with serving(tmp_path, quota_bytes=100_000, quota_jobs=1) as client:
-        mesh_id = upload_sample(client, "plane", 200)
-        other = TestClient(client.app, client=("10.0.0.2", 1))
-        other.portal = client.portal
-
-        check_problem(upload(other, None, 242), 507, "quota_exceeded")
-        body, link = {"sources": [{"vertex": 0}]}, f"/v1/meshes/{mesh_id}/distances"
-        assert client.post(link, json=body, headers=ASYNC).status_code == 202
-        check_problem(other.post(link, json=body, headers=ASYNC), 429, "quota_exceeded")

@@ -131,27 +131,6 @@ def test_a_mesh_of_one_is_known_to_the_other(pair: Pair) -> None:
         check_problem(server.client.get(link), 404, "mesh_not_found")
 
 
-def test_the_limit_of_uploads_holds_for_both(cluster: ProcessCluster, pair: Pair) -> None:
-    sample = {"sample": "plane", "faces": 50}
-
-    def upload() -> Any:
-        while True:  # until no other one that is to be refused has the place
-            response = pair[0].client.post("/v1/meshes", params=sample)
-            if response.status_code != 429:
-                return response
-
-    with ThreadPoolExecutor(1) as pool:
-        with stopped(cluster.nodes[0].workers()):
-            waiting = pool.submit(upload)
-            wait_until(lambda: _is_over_quota(pair[1], sample))
-        assert waiting.result().status_code in (200, 201)
-
-
-def _is_over_quota(server: Server, sample: dict[str, Any]) -> bool:
-    refused = server.client.post("/v1/meshes", params=sample, headers={"X-Timeout-Ms": "200"})
-    return bool(refused.json().get("code") == "quota_exceeded")
-
-
 @pytest.mark.full
 def test_a_database_that_restarts_under_load(postgres: Postgres, pair: Pair, small: str) -> None:
     """Each request is answered rightly or with 503, and nothing that was accepted is lost."""

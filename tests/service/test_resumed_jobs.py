@@ -23,13 +23,16 @@ QUERIES: dict[str, dict[str, Any]] = {
     "paths": {"source": INSIDE, "targets": [{"vertex": 9}, VERTEX]},
     "isolines": {"sources": [INSIDE], "count": 3},
     "borders": {"sources": [INSIDE, {"vertex": 9}]},
+    "boundaries": {"barriers": [3]},
     "matrix": {"sources": [VERTEX, INSIDE], "targets": [{"vertex": 9}]},
     "nearest": {"source": INSIDE, "candidates": [{"vertex": 9}, VERTEX], "k": 2},
+    "log_map": {"source": INSIDE, "x_axis": [1, 0, 0]},
+    "trace": {"starts": [INSIDE], "directions": [[1, 0, 0]], "lengths": [0.3]},
     "locate": {"points": [[0.1, 0.2, 0.3]]},
     "steps": {"source": VERTEX, "target": INSIDE},
 }
 """A query of each kind"""
-LINKS = {kind: kind for kind in QUERIES} | {"steps": "path/steps"}
+LINKS = {kind: kind for kind in QUERIES} | {"steps": "path/steps", "log_map": "log-map"}
 
 
 @contextmanager

@@ -1,36 +1,34 @@
 """Databases of both kinds, each empty."""
 
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import TypeVar
 
 import pytest
 
-from app.state import Database, SqliteDatabase
+from app.state import Database
 
-AnyDatabase = TypeVar("AnyDatabase", bound=Database)
+
+@pytest.fixture(scope="session")
+def anyio_backend() -> str:
+    return "asyncio"
 
 
 @pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.service)])
-def database(request: pytest.FixtureRequest, tmp_path: Path) -> Database:
-    """A database that is prepared, and not open."""
+def state_url(request: pytest.FixtureRequest) -> str | None:
+    """The URL of a new database of PostgreSQL; None for SQLite."""
     if request.param == "sqlite":
-        database: Database = SqliteDatabase(tmp_path / "jobs.sqlite3")
-    else:
-        url = request.getfixturevalue("postgres").new_database()
-        from app.state.postgres import PostgresDatabase
+        return None
+    url: str = request.getfixturevalue("postgres").new_database()
+    return url
 
-        database = PostgresDatabase(url)
+
+@pytest.fixture
+async def database(
+    state_url: str | None, tmp_path: Path, anyio_backend: str
+) -> AsyncIterator[Database]:
+    """A database that is prepared."""
+    assert anyio_backend == "asyncio"
+    database = Database(tmp_path / "jobs.sqlite3", state_url)
     database.prepare()
-    return database
-
-
-@asynccontextmanager
-async def opened(database: AnyDatabase) -> AsyncIterator[AnyDatabase]:
-    """Open a database inside the block."""
-    await database.open()
-    try:
-        yield database
-    finally:
-        await database.close()
+    yield database
+    await database.aclose()

@@ -60,6 +60,7 @@ QUESTIONS: dict[str, Callable[[], object]] = {
         POINT
     ),
     "barriers": lambda: gc.exact_distance(MESH, LAST, barriers=[0, 1]).path_to(LAST // 2),
+    "cut": lambda: gc.cut(MESH, [CURVE, gc.shortest_path(MESH, 0, LAST)]).mesh,
     "limit": lambda: gc.exact_distance(MESH, 0, max_distance=0.3),
     "matrix": lambda: gc.distance_matrix(MESH, [0, POINT], [LAST]),
     "nearest": lambda: gc.nearest(MESH, 0, [5, LAST], k=2),

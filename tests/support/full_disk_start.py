@@ -1,17 +1,17 @@
-"""Starts of a service on a full disk: ``python full_disk_start.py``, where ``/mnt`` is its own."""
+"""A start of a service on a full disk: ``python full_disk_start.py``, where ``/mnt`` is its own."""
 
-import sqlite3
+import os
+import subprocess
 import sys
 from contextlib import closing, suppress
 from pathlib import Path
 
-from tests.support.processes import Server
-from tests.support.service import check_problem, upload_sample
+from tests.support.processes import COMMAND_LINE, Server
+from tests.support.service import upload_sample
 from tests.support.waiting import wait_until
 
 STORE = Path("/mnt/store")
 FILLER = Path("/mnt/filler")
-ASYNC = {"Prefer": "respond-async"}
 
 
 def fill() -> None:
@@ -23,29 +23,10 @@ def fill() -> None:
 
 def submit(server: Server, link: str) -> str:
     query = {"sources": [{"vertex": 0}]}
-    response = server.client.post(f"{link}/distances", json=query, headers=ASYNC)
+    headers = {"Prefer": "respond-async"}
+    response = server.client.post(f"{link}/distances", json=query, headers=headers)
     assert response.status_code == 202, response.text
     return str(response.headers["location"])
-
-
-def check_start_without_a_table() -> None:
-    """Start as if the first start after an upgrade had been killed; jobs can be removed."""
-    with closing(sqlite3.connect(STORE / "jobs.sqlite3")) as database:
-        database.execute("DROP TABLE queries")
-    fill()
-    with closing(Server(STORE)) as server:
-        (job, *others) = server.client.get("/v1/jobs").json()["jobs"]
-        link = f"/v1/meshes/{job['mesh_id']}"
-        assert server.client.get(job["links"]["results"]).status_code == 200
-        assert server.client.delete(f"/v1/jobs/{job['id']}").status_code == 200
-        assert server.client.get("/v1/jobs").json()["jobs"] == others
-        sample = {"sample": "plane", "faces": 20_000}
-        check_problem(server.client.post("/v1/meshes", params=sample), 507, "storage_full")
-        FILLER.unlink()
-        assert server.client.post("/v1/meshes", params=sample).status_code == 201
-        submit(server, link)
-        assert (STORE / "jobs.reserve").exists()
-        end(server)
 
 
 def end(server: Server) -> None:
@@ -56,11 +37,27 @@ def end(server: Server) -> None:
 def main() -> None:
     with closing(Server(STORE)) as server:
         link = f"/v1/meshes/{upload_sample(server.client, 'plane', 200)}"
-        for _ in range(3):
-            job = submit(server, link)
-            wait_until(lambda job=job: server.client.get(job).json()["status"] == "successful")
+        job = submit(server, link)
+        wait_until(lambda: server.client.get(job).json()["status"] == "successful")
+        before = server.client.get("/v1/jobs").json()
         end(server)
-    check_start_without_a_table()
+    fill()
+    ran = subprocess.run(  # noqa: S603 - this Python
+        [*COMMAND_LINE, "serve", "--port", "0"],
+        env=os.environ | {"GEODESIC_STORE": str(STORE)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ran.returncode == 1, ran.stderr
+    assert "jobs.sqlite3 cannot be used: " in ran.stderr
+    assert "Traceback" not in ran.stderr
+    FILLER.unlink()
+    with closing(Server(STORE)) as server:
+        assert server.client.get("/v1/jobs").json() == before
+        assert server.client.get(f"{job}/results").status_code == 200
+        submit(server, link)
+        end(server)
 
 
 if __name__ == "__main__":

@@ -26,13 +26,31 @@ def weights_in(corners, points):
 
 
 def line_points(mesh, line):
-    """The points of a line as points of the surface."""
+    """The points of a line as points of the surface, found by their positions.
+
+    Its locations are the same: nowhere else, and neighbours are in the face of their segment.
+    """
     faces = line.faces if line.closed else [*line.faces, line.faces[-1]]
     weights = weights_in(mesh.vertices[mesh.faces[faces]], line.points)
     weights[weights < 1e-13] = 0.0
     weights /= weights.sum(axis=1, keepdims=True)
     pairs = zip(np.asarray(faces).tolist(), weights.tolist(), strict=True)
-    return [mesh.point(gc.SurfacePoint.face(face, tuple(each))) for face, each in pairs]
+    found = [mesh.point(gc.SurfacePoint.face(face, tuple(each))) for face, each in pairs]
+    check_locations(mesh, line)
+    return found
+
+
+def check_locations(mesh, line):
+    """Locations give the points, and each segment's face has both of its ends, to the bit."""
+    positions = [mesh.position(point) for point in line.locations]
+    size = np.abs(mesh.vertices - mesh.vertices[0]).max()
+    np.testing.assert_allclose(line.points, positions, rtol=0.0, atol=1e-11 * size)
+    ends = [*line.locations, *line.locations[: int(line.closed)]]
+    for face, *segment in zip(line.faces.tolist(), ends[:-1], ends[1:], strict=True):
+        corners = set(mesh.faces[face].tolist())
+        for point in segment:
+            near = mesh.faces[point.face_index][np.array(point.barycentric) > 0.0]
+            assert point.face_index == face or set(near.tolist()) <= corners
 
 
 def check_points(mesh, sources, level, lines, most=60):

@@ -1,15 +1,12 @@
 """Jobs for tests."""
 
 import asyncio
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
 
 from app.jobs.job import Job, JobSpec
-from app.jobs.repository import JobRecords, JobRepository
+from app.jobs.repository import JobRepository
 from app.state import Database
 
 SPEC = JobSpec(
-    owner=None,
     kind="distances",
     mesh_id="0" * 32,
     media_type="application/json",
@@ -19,20 +16,19 @@ SPEC = JobSpec(
 )
 
 
-def new_job(owner: str | None = None) -> Job:
-    return Job(spec=SPEC.model_copy(update={"owner": owner}))
+def new_job(client: str = "", key: str | None = None) -> Job:
+    return Job(spec=SPEC.model_copy(update={"client": client, "idempotency_key": key}))
 
 
 class SlowSubmissions(JobRepository):
-    """Says that the record of a new job is written only when it may."""
+    """Says that a new job is recorded only when it may."""
 
     def __init__(self, database: Database) -> None:
         super().__init__(database)
         self.written, self.may_say = asyncio.Event(), asyncio.Event()
 
-    @asynccontextmanager
-    async def alone(self, owner: str | None) -> AsyncIterator[JobRecords]:
-        async with super().alone(owner) as records:
-            yield records
-            self.written.set()
-            await self.may_say.wait()
+    async def add(self, job: Job, query: bytes) -> Job:
+        added = await super().add(job, query)
+        self.written.set()
+        await self.may_say.wait()
+        return added

@@ -1,7 +1,8 @@
 """Processes that are killed before the n-th change of files in a folder, or of records of jobs.
 
 Python tells audit hooks of each change of a file before it is made. What SQLite does itself is told
-by the database: there is a step before each statement, and one after it.
+by SQLAlchemy: there is a step before and after each statement that changes something, and one
+before its commit.
 """
 
 import os
@@ -11,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from app.state.sqlite import SqliteDatabase
+from sqlalchemy import Connection, Engine, event
 
 _CHANGES = frozenset({"os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.utime", "os.truncate"})
 _WRITING = os.O_WRONLY | os.O_RDWR
@@ -24,15 +25,20 @@ class Killer:
         self._folder: str | None = None
         self._left = 0
         sys.addaudithook(self._hear)  # it cannot be removed
-        run = SqliteDatabase._run
+        event.listen(Engine, "before_cursor_execute", self._begin_change)
+        event.listen(Engine, "after_cursor_execute", self._begin_change)
+        event.listen(Engine, "commit", self._begin_commit)
 
-        async def run_in_steps(database: SqliteDatabase, sql: str, *values: Any) -> int:
+    def _begin_change(
+        self, connection: Connection, _: object, statement: str, *_more: object
+    ) -> None:
+        if not statement.startswith(("SELECT", "PRAGMA")):
+            connection.info["has_changed"] = True
             self.step()
-            changed = await run(database, sql, *values)
-            self.step()
-            return changed
 
-        SqliteDatabase._run = run_in_steps  # type: ignore[method-assign]
+    def _begin_commit(self, connection: Connection) -> None:
+        if connection.info.pop("has_changed", False):
+            self.step()
 
     def arm(self, folder: Path, steps: int) -> None:
         """Have the process killed before a change of files in ``folder``, the ``steps``-th."""

@@ -24,6 +24,7 @@ from app.store.scratch import Scratch
 from app.store.store import Store
 from geodesic_core.fields.fast_sweep import FastSweep
 from geodesic_core.fields.sweeps import WholeSweep
+from tests.support import zoo
 from tests.support.against import ClusterClient, is_against_cluster, serving_cluster
 from tests.support.processes import workers_of
 from tests.support.waiting import LONG_S, wait_until
@@ -113,6 +114,19 @@ def plane(client: TestClient) -> str:
     return upload_sample(client, "plane", 200)
 
 
+@pytest.fixture(scope="module")
+def terrain(client: TestClient) -> str:
+    return upload_sample(client, "terrain", 800)
+
+
+@pytest.fixture(scope="module")
+def book(client: TestClient) -> str:
+    """Three faces at one edge."""
+    case = zoo.IRREGULAR["book_of_3"]
+    mesh = {"vertices": case.vertices.tolist(), "faces": case.faces.tolist()}
+    return str(client.post("/v1/meshes", json=mesh).json()["id"])
+
+
 @pytest.fixture(scope="session")
 def apart(client: TestClient) -> str:
     """The id of a mesh of two components."""
@@ -128,7 +142,7 @@ async def scratch_folder(store: MeshStore) -> AsyncIterator[Path]:
         yield folder.path
 
 
-def store_mesh(root: Path, mesh: gc.TriangleMesh, owner: str | None = None) -> str:
+def store_mesh(root: Path, mesh: gc.TriangleMesh) -> str:
     """Put a mesh into a store on which no service runs."""
     store = MeshStore(root)
     own = Store(root)
@@ -136,7 +150,7 @@ def store_mesh(root: Path, mesh: gc.TriangleMesh, owner: str | None = None) -> s
 
     async def add() -> str:
         async with scratch_folder(store) as folder:
-            written = store.write_aside(mesh, folder / "mesh", owner)
+            written = store.write_aside(mesh, folder / "mesh")
             await catalog.add(written)
             return written.mesh_id
 

@@ -12,12 +12,9 @@ from app.http.middleware.rate_limits import MinuteRate, RateLimits
 from app.http.page import ASSETS
 from app.http.prefix import path_in
 from app.settings import Settings
-from app.state import Allowances
 
 _OPEN = PROBES | {"/", "/docs", "/openapi.json"}
 _OPEN_FOLDERS = ("/problems/", f"{ASSETS}/")
-_COUNTED_LOCALLY = "/metrics"
-"""Each replica counts requests for it by itself, so that metrics need no database"""
 _BEARER = re.compile(rb"bearer +([A-Za-z0-9._~+/-]+=*)", re.IGNORECASE)
 
 WRONG_KEYS_A_MINUTE = 10
@@ -32,16 +29,10 @@ def is_open(path: str) -> bool:
 
 
 class AdmissionMiddleware:
-    """Middleware that finds the caller (``request.state.caller``), and admits or refuses it.
+    """Middleware that finds the caller (``request.state.caller``), and admits or refuses it."""
 
-    With ``allowances`` the limits hold for all replicas together, except on scrapes.
-    """
-
-    def __init__(
-        self, app: ASGIApp, settings: Settings, allowances: Allowances | None = None
-    ) -> None:
+    def __init__(self, app: ASGIApp, settings: Settings) -> None:
         self.app = app
-        self.allowances = allowances
         self.keys = settings.api_keys
         self.rate_limits = RateLimits(settings.rate_limit, settings.max_concurrent)
         self.wrong_keys = MinuteRate(WRONG_KEYS_A_MINUTE)
@@ -52,12 +43,8 @@ class AdmissionMiddleware:
             await self.app(scope, receive, send)
             return
         scope["state"]["caller"] = caller = await self._admit(scope)
-        if self.allowances is None or path_in(scope) == _COUNTED_LOCALLY:
-            with self.rate_limits.counting(caller):
-                await self.app(scope, receive, send)
-        else:
-            async with self.rate_limits.counting_for_all(caller, self.allowances):
-                await self.app(scope, receive, send)
+        with self.rate_limits.counting(caller):
+            await self.app(scope, receive, send)
 
     async def _admit(self, scope: Scope) -> Caller:
         host = scope["client"][0] if scope["client"] else None

@@ -1,8 +1,8 @@
 """Rate limits of each caller: requests a minute, and concurrent requests."""
 
 from collections import OrderedDict
-from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager, contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager
 from math import ceil
 from time import monotonic
 
@@ -11,7 +11,6 @@ from pyrate_limiter import GCRA, Duration, Rate
 from app.access import Caller
 from app.errors import over_limit
 from app.service.concurrency import ConcurrencyLimit
-from app.state import Allowances
 
 _REMEMBERED = 10_000
 """Callers whose rates are remembered, in some 200 bytes each.
@@ -55,20 +54,11 @@ class RateLimits:
         """Count the block as one request, or refuse it with ``rate_limited``."""
         with self._at_once.counting(caller):
             if self._rate is not None:
-                _refuse_rate(self._rate.seconds_over(caller.name), self._rate.limit)
+                self._refuse_over(self._rate, caller)
             yield
 
-    @asynccontextmanager
-    async def counting_for_all(self, caller: Caller, allowances: Allowances) -> AsyncIterator[None]:
-        """Count the block in what all replicas count, or refuse it with ``rate_limited``."""
-        async with self._at_once.counting_for_all(caller, allowances):
-            if self._rate is not None:
-                limit = self._rate.limit
-                _refuse_rate(await allowances.seconds_over(caller.name, limit), limit)
-            yield
-
-
-def _refuse_rate(wait_s: int, limit: int) -> None:
-    if wait_s:
-        what, headers = "requests within a minute", {"Retry-After": str(wait_s)}
-        raise over_limit("rate_limited", what, limit + 1, limit, "rate_limit", headers=headers)
+    def _refuse_over(self, rate: MinuteRate, caller: Caller) -> None:
+        wait_s, limit = rate.seconds_over(caller.name), rate.limit
+        if wait_s:
+            what, headers = "requests within a minute", {"Retry-After": str(wait_s)}
+            raise over_limit("rate_limited", what, limit + 1, limit, "rate_limit", headers=headers)

@@ -39,8 +39,6 @@ _LIMITS = (
     "job_ttl",
     "rate_limit",
     "max_concurrent",
-    "quota_bytes",
-    "quota_jobs",
     "quota_results_bytes",
     "quota_uploads",
 )

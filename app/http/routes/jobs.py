@@ -9,7 +9,7 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from app.encoding import JSON
 from app.errors import ProblemError, problem
-from app.http.dependencies import CallerDep, ServiceDep, check_accepted
+from app.http.dependencies import ServiceDep, check_accepted
 from app.http.prefix import prefix_of
 from app.http.responses import (
     FILE_HEADERS,
@@ -33,9 +33,9 @@ _NUMBER = re.compile("[0-9]{1,18}")
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 
 
-async def get_job_of_path(job_id: str, service: ServiceDep, caller: CallerDep) -> Job:
+async def get_job_of_path(job_id: str, service: ServiceDep) -> Job:
     """Return the job that the path names."""
-    return await service.jobs.find(caller.owner, job_id)
+    return await service.jobs.find(job_id)
 
 
 JobDep = Annotated[Job, Depends(get_job_of_path)]
@@ -44,7 +44,7 @@ JobDep = Annotated[Job, Depends(get_job_of_path)]
 @router.get(
     "",
     operation_id="listJobs",
-    summary="List your jobs",
+    summary="List the jobs",
     response_model=JobList,
     response_model_exclude_unset=True,
     responses={
@@ -57,12 +57,11 @@ async def list_jobs(
     request: Request,
     response: Response,
     service: ServiceDep,
-    caller: CallerDep,
 ) -> dict[str, Any]:
     """List jobs, the newest first, `limit` at a time."""
     response.headers.update(UNSTORED)
     before = _number(parameters.cursor)
-    jobs, after = await service.jobs.page(caller.owner, parameters.limit, before)
+    jobs, after = await service.jobs.page(parameters.limit, before)
     cursor = None if after is None else str(after)
     return {
         "jobs": [job_document(job, prefix_of(request.scope)) for job in jobs],
@@ -95,14 +94,12 @@ async def get_job(job: JobDep, request: Request, response: Response) -> dict[str
     response_model_exclude_unset=True,
     responses=problems("job_not_found", "state_unavailable"),
 )
-async def cancel_job(
-    job_id: str, request: Request, service: ServiceDep, caller: CallerDep
-) -> dict[str, Any]:
+async def cancel_job(job_id: str, request: Request, service: ServiceDep) -> dict[str, Any]:
     """Stop a job that waits or runs; its state becomes `dismissed`.
 
     A job that has finished stays as it is, with its answer.
     """
-    cancelled = await service.jobs.cancel(caller.owner, job_id)
+    cancelled = await service.jobs.cancel(job_id)
     return job_document(cancelled, prefix_of(request.scope))
 
 
@@ -114,11 +111,9 @@ async def cancel_job(
     response_model_exclude_unset=True,
     responses=problems("job_not_found", "state_unavailable"),
 )
-async def delete_job(
-    job_id: str, request: Request, service: ServiceDep, caller: CallerDep
-) -> dict[str, Any]:
+async def delete_job(job_id: str, request: Request, service: ServiceDep) -> dict[str, Any]:
     """Remove a job, and return its last state; one that waits or runs is stopped first."""
-    removed = await service.jobs.remove(caller.owner, job_id)
+    removed = await service.jobs.remove(job_id)
     return job_document(removed, prefix_of(request.scope))
 
 
@@ -148,14 +143,12 @@ async def delete_job(
         ),
     },
 )
-async def get_job_results(
-    job_id: str, request: Request, service: ServiceDep, caller: CallerDep
-) -> Response:
+async def get_job_results(job_id: str, request: Request, service: ServiceDep) -> Response:
     """Return the answer in the format and coding of the query, or the problem that the query met.
 
     A request whose `Accept` or `Accept-Encoding` excludes them gets 406.
     """
-    job, result = await service.jobs.result(caller.owner, job_id)
+    job, result = await service.jobs.result(job_id)
     media_type = job.spec.media_type
     try:
         check_accepted(request, media_type, result.manifest.headers.get("Content-Encoding"))

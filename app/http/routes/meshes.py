@@ -11,7 +11,6 @@ from app.encoding import NPY
 from app.engine.work import MeshFromFile, MeshFromSample
 from app.errors import Fault, over_limit, problem
 from app.http.dependencies import (
-    CallerDep,
     ContextDep,
     ServiceDep,
     note_work,
@@ -42,6 +41,15 @@ from app.service.time_limit import time_limit
 router = APIRouter(prefix="/meshes", tags=["meshes"])
 
 _DEFAULT_SAMPLE_FACES = 20_000
+
+
+def _triples(items: dict[str, object]) -> dict[str, object]:
+    return {
+        "type": "array",
+        "items": {"type": "array", "items": items, "minItems": 3, "maxItems": 3},
+    }
+
+
 _BINARY = {"schema": {"type": "string", "format": "binary"}}
 _BODIES = {
     "requestBody": {
@@ -59,25 +67,14 @@ _BODIES = {
                 "schema": {
                     "type": "object",
                     "additionalProperties": False,
-                    "required": ["vertices", "faces"],
+                    "required": ["faces"],
                     "properties": {
-                        "vertices": {
-                            "type": "array",
-                            "items": {
-                                "type": "array",
-                                "items": {"type": "number"},
-                                "minItems": 3,
-                                "maxItems": 3,
-                            },
-                        },
-                        "faces": {
-                            "type": "array",
-                            "items": {
-                                "type": "array",
-                                "items": {"type": "integer", "minimum": 0},
-                                "minItems": 3,
-                                "maxItems": 3,
-                            },
+                        "vertices": _triples({"type": "number"}),
+                        "faces": _triples({"type": "integer", "minimum": 0}),
+                        "lengths": {
+                            **_triples({"type": "number"}),
+                            "description": "Lengths of the edges of each face, number i from "
+                            "corner i to corner i + 1: in place of vertices, or beside them",
                         },
                     },
                 },
@@ -111,7 +108,6 @@ _BODIES = {
             "invalid_mesh",
             "quota_exceeded",
             *WORK_PROBLEMS,
-            quota_exceeded=507,
         ),
     },
     openapi_extra=_BODIES,
@@ -129,9 +125,14 @@ async def create_mesh(
     bzip2, xz or zip; the body, except a form, may also have `Content-Encoding: gzip`. Vertices and
     triangles keep the order they have in the file; polygons become triangles in their place, and
     `face_map` leads back to them.
+
+    A surface may be given by the lengths of its edges: as JSON with `faces` and `lengths`, or as an
+    `.npz` file of these arrays, in both with `vertices` or without. Without, all that lies on the
+    surface is answered, with `null` in place of positions; what needs space is refused as
+    `not_embedded`.
     """
     refuse_idempotency_key(request)
-    async with service.counting_upload(context.caller):
+    with service.uploads.counting(context.caller):
         if parameters.sample is None:
             stored = await _add_upload(service, parameters, request, context)
         else:
@@ -192,14 +193,14 @@ async def get_mesh(
     operation_id="deleteMesh",
     summary="Remove a mesh and its results",
     status_code=204,
-    responses=problems("forbidden", "mesh_not_found", "store_unavailable"),
+    responses=problems("mesh_not_found", "store_unavailable"),
 )
-async def delete_mesh(mesh_id: str, service: ServiceDep, caller: CallerDep) -> None:
+async def delete_mesh(mesh_id: str, service: ServiceDep) -> None:
     """Remove a mesh; queries that run on it are still answered.
 
-    Where keys are set, only the key that stored the mesh first may remove it.
+    Where keys are set, any key may remove it.
     """
-    await service.delete_mesh(mesh_id, caller)
+    await service.delete_mesh(mesh_id)
 
 
 @router.get(
@@ -231,7 +232,7 @@ async def delete_mesh(mesh_id: str, service: ServiceDep, caller: CallerDep) -> N
 async def get_mesh_array(
     mesh_id: str, name: str, request: Request, service: ServiceDep
 ) -> Response:
-    """Send `vertices`, `faces`, `vertex_map`, `face_map` or `components`; ranges are served."""
+    """Send `vertices`, `faces`, `lengths`, `vertex_map`, `face_map` or `components`, or a range."""
     path = await service.array_file(mesh_id, name)
     etag = etag_of(f"{mesh_id}-{name}")
     return not_modified(request, etag, IMMUTABLE) or StoredFileResponse(

@@ -94,8 +94,10 @@ OPERATIONS = (
         queries.IsolinesQuery,
         answers.IsolinesAnswer,
         "computeIsolines",
-        "Lines of equal distance from sources",
-        "Return the polylines of points at each level, exact where they cross edges.",
+        "Lines of equal distance from sources, or of equal values",
+        "Return the polylines of points at each level, exact where they cross edges.\n\nThe values "
+        "are your own, one for each vertex, and of any sign. What is at a level itself counts as "
+        "below it.",
         "The lines of each level, closed and open",
         _LINES,
     ),
@@ -107,6 +109,16 @@ OPERATIONS = (
         "Borders between the territories of sources",
         "Return polylines of points that are equally near to two sources, and no nearer to a "
         "third.\n\nThey are exact where they cross edges and where they meet.",
+        "The lines, closed and open",
+        _LINES,
+    ),
+    Operation(
+        "/boundaries",
+        queries.BoundariesQuery,
+        answers.BoundariesAnswer,
+        "computeBoundaries",
+        "The boundary of the surface, as curves along its edges",
+        "Return the curves of edges with one face, longest first, with the surface on their left.",
         "The lines, closed and open",
         _LINES,
     ),
@@ -132,6 +144,33 @@ OPERATIONS = (
         "Return the `k` nearest candidates, or fewer if fewer can be reached.",
         "The candidates, nearest first",
         (CSV,),
+    ),
+    Operation(
+        "/log-map",
+        queries.LogMapQuery,
+        answers.LogMapAnswer,
+        "computeLogMap",
+        "How far all vertices are from a point, and in which direction: its exact log map",
+        "Return the distance of each vertex, the angle at which its shortest path leaves the "
+        "source, and its coordinates in\nthe tangent plane.\n\nShortest paths bend at saddles and "
+        "at the boundary. All that lies behind the first bend is seen in its\ndirection; `bends` "
+        "tells where.",
+        "The map. In binary, a row for each vertex: distance, angle, two coordinates, bends (-1 "
+        "where unreachable); as PLY, the mesh with these at its vertices",
+        (NPY, OCTETS, CSV, PLY),
+    ),
+    Operation(
+        "/trace",
+        queries.TraceQuery,
+        answers.TraceAnswer,
+        "traceLines",
+        "Straightest lines from points in directions",
+        "Return the lines that go straight on over faces and edges, and at equal angles through "
+        "vertices.\n\nThey end at their length, at the boundary, at barriers, and where more than "
+        "two faces meet.",
+        "The lines. In binary, a row for each point, with the numbers of CSV: line, length, "
+        "end_direction, point, x, y, z, face, u, v, w",
+        (NPY, OCTETS, *_LINES),
     ),
     Operation(
         "/locate",

@@ -1,47 +1,40 @@
-"""Revisions of the tables in PostgreSQL, each applied once, by Alembic."""
+"""Revisions of the tables, each applied once, by Alembic."""
 
 from pathlib import Path
-from typing import Any
 
-from alembic import command
-from alembic.config import Config
-from alembic.util import CommandError
-from psycopg import Connection
-from sqlalchemy import create_engine, text
-from sqlalchemy.exc import DBAPIError
-from sqlalchemy.pool import StaticPool
+from sqlalchemy import Connection, insert, inspect, select
 
-from app.settings import variable_of
-from app.state.database import StateError
+from app.state.errors import StateError
+from app.state.schema import BEFORE_ALEMBIC, HEAD, metadata, revision
 
 
-def upgrade(connection: Connection[Any]) -> None:
-    """Apply the revisions that a database lacks, in one transaction, one service at a time.
+def bring_up_to_date(connection: Connection) -> None:
+    """Create the tables that are missing, and apply the revisions that others lack.
 
     Raises
     ------
     StateError
         A newer release has been there.
-    psycopg.Error
-        The server refuses, or is away.
     """
-    engine = create_engine(
-        "postgresql+psycopg://", creator=lambda: connection, poolclass=StaticPool
-    )
-    config = Config()
+    is_new = not inspect(connection).has_table("jobs")
+    metadata.create_all(connection)
+    found = connection.scalar(select(revision.c.version_num))
+    if found is None:
+        found = HEAD if is_new else BEFORE_ALEMBIC
+        connection.execute(insert(revision).values(version_num=found))
+    if found != HEAD:
+        _upgrade(connection)
+
+
+def _upgrade(connection: Connection) -> None:
+    from alembic import command  # a quarter of a second, and hardly ever needed
+    from alembic.config import Config
+    from alembic.util import CommandError
+
+    config = Config(attributes={"connection": connection})
     config.set_main_option("script_location", str(Path(__file__).parent))
-    # With autocommit there would be no transaction, and each statement would release the lock.
-    connection.autocommit = False
     try:
-        with engine.begin() as transaction:
-            transaction.execute(text("SELECT pg_advisory_xact_lock(hashtextextended('schema', 0))"))
-            config.attributes["connection"] = transaction
-            command.upgrade(config, "head")
+        command.upgrade(config, HEAD)
     except CommandError as error:
-        detail = "a newer release of the service has upgraded the database"
-        raise StateError(f"{detail} of {variable_of('state')}: use that release") from error
-    except DBAPIError as error:
-        raise error.orig or error from None
-    finally:
-        if not connection.closed:
-            connection.autocommit = True
+        message = "a newer release of the service has upgraded the database: use that release"
+        raise StateError(message) from error

@@ -5,7 +5,9 @@ import type { MeshDocument } from "./api/types";
 import { Borders } from "./ask/borders";
 import { Fields } from "./ask/fields";
 import { Isolines } from "./ask/isolines";
+import { Rays } from "./ask/rays";
 import { Routes } from "./ask/routes";
+import { Walks } from "./ask/walks";
 import { byId } from "./dom";
 import {
   dismissHint,
@@ -39,6 +41,8 @@ const notes = new Notes();
 const fields = new Fields(status, sceneView, notes);
 const isolines = new Isolines(status, sceneView, fields, notes);
 const borders = new Borders(status, sceneView, fields, notes);
+const rays = new Rays(status, sceneView, fields, notes);
+const walks = new Walks(status, sceneView, notes);
 const routes = new Routes(status, sceneView, notes);
 const meshes = new Meshes(store, status);
 const controls = new Controls(store, status, sceneView, notes);
@@ -54,6 +58,7 @@ stage.onMove = (view) => store.update({ view, up: sceneView.mesh?.frame.up ?? nu
 fields.onPaint = (state) => {
   isolines.follow(state);
   borders.follow(state);
+  rays.follow(state);
 };
 setUpAppearance(() => void showWires(store.state));
 
@@ -73,10 +78,12 @@ store.listen((state, before) => {
   exportPanel.show(state);
   fields.follow(state);
   routes.follow(state);
+  walks.follow(state);
   if (state.unit !== before.unit) nameUnit(state);
   if (state.range !== before.range) fields.paint(state);
   if (state.palette !== before.palette) showPalette(state);
   if (state.lines !== before.lines) isolines.follow(state);
+  if (state.polar !== before.polar) rays.follow(state);
   if (state.wireframe !== before.wireframe) void showWires(state);
   if (state.sources.length > 0 && !pointer.follows) dismissHint();
   if (sceneView.mesh) sceneView.showPoints(state);
@@ -114,6 +121,7 @@ function open(mesh: string): void {
   sceneView.close();
   isolines.forget();
   borders.forget();
+  rays.forget();
   report = null;
   notes.begin(report);
   showReport(report, sceneView, "", null);
@@ -134,6 +142,7 @@ function open(mesh: string): void {
     sceneView.showBarriers(now);
     fields.paint(now);
     routes.draw();
+    walks.draw();
     showPalette(now);
     await showWires(now);
   });

@@ -18,6 +18,7 @@ function randomState(random: Random): State {
     sources: random.list(3, point),
     target: random.pick([null, point()]),
     waypoints: random.list(3, point),
+    walk: random.pick([null, [random.size(), -random.size(), 0] as [number, number, number]]),
     barriers: [...barriers].sort((a, b) => a - b),
     method: random.pick(["exact", "approximate", "fast"] as const),
     error: random.pick([INITIAL.error, random.size()]),
@@ -27,6 +28,7 @@ function randomState(random: Random): State {
     unit: random.pick(["", "mm", "µm & more"]),
     shade: random.pick(["distance", "territories", "difference"] as const),
     lines: random.pick([null, { count: 1 + random.below(99) }, { spacing: random.size() }]),
+    polar: random.pick([true, false]),
     palette: random.pick(PALETTES),
     range: random.pick([null, random.size()]),
     wireframe: random.pick([true, false]),
@@ -102,6 +104,10 @@ describe("reading", () => {
       expect(() => readState(`?barriers=1,${part}`)).toThrow(`“${part}” is neither the number`);
     },
   );
+
+  test.each(["1,2", "1,2,3,4", "1,two,3", "1,2,Infinity"])("“%s” as a walk is refused", (text) => {
+    expect(() => readState(`?walk=${text}`)).toThrow(`“${text}” is not a direction`);
+  });
 
   test.each([
     ["method=fastest", {}],

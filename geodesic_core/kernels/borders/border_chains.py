@@ -15,7 +15,8 @@ from geodesic_core.kernels.curves.chains import (
     with_chain,
 )
 from geodesic_core.kernels.curves.conics import END, START, is_line, point_on, strays
-from geodesic_core.kernels.curves.crossings import crossings_around, put_crossing, put_in_face
+from geodesic_core.kernels.curves.crossings import crossings_around, put_crossing
+from geodesic_core.kernels.curves.face_points import put_in_face
 from geodesic_core.kernels.curves.rows import ROWS, copy_rows, with_room
 from geodesic_core.kernels.jit import borrowed, kernel
 
@@ -39,8 +40,8 @@ class FaceNodes(NamedTuple):
 class TracedBorders(NamedTuple):
     """The borders in some faces, from node to node: a crossing, or a point in the face."""
 
-    points: Floats
-    """(N, 3): those of all chains"""
+    weights: Floats
+    """(N, 3): the points of all chains, by their weights in its face"""
     chains: ChainRows
     """Nodes below the number of crossings are these"""
     sources: Ints
@@ -51,14 +52,14 @@ class TracedBorders(NamedTuple):
 
 @kernel
 def trace_bisector(
-    embedding: Any, face: int, curve: Floats, error: float, points: Floats, count: int
+    geometry: Floats, face: int, curve: Floats, error: float, weights: Floats, count: int
 ) -> Any:
-    """Append the points inside a bisector to ``points``, but for its ends; return both.
+    """Append the points of a bisector to ``weights``, but for its ends; return both.
 
     Pieces that may stray farther from their chords than ``error`` are halved.
     """
     if is_line(curve):
-        return points, count
+        return weights, count
     stack = np.empty((DEPTH + 2, 2))
     start, top = curve[START], 0
     stack[0, 0], stack[0, 1] = curve[END], 0.0
@@ -71,16 +72,16 @@ def trace_bisector(
             continue
         if top > 0:
             x, y = point_on(curve, end)
-            points = with_room(points, count + 1)
-            put_in_face(embedding, face, x, y, points, count)
+            weights = with_room(weights, count + 1)
+            put_in_face(geometry, face, x, y, weights, count)
             count += 1
         start, top = end, top - 1
-    return points, count
+    return weights, count
 
 
 @kernel
 def trace_borders(
-    embedding: Any, territories: Any, labelled: Any, near: float, chord_error: float, first: int,
+    topology: Any, territories: Any, labelled: Any, near: float, chord_error: float, first: int,
     last: int, next_node: int,
 ) -> TracedBorders:  # fmt: skip
     """Trace the borders of two sources in each of the faces from row ``first`` up to ``last``.
@@ -88,9 +89,9 @@ def trace_borders(
     Nodes in faces have numbers from ``next_node`` on. Ends nearer than ``near``, mesh units, are
     one. O(n³) for n bisectors in a face.
     """
-    embedding, territories = borrowed(embedding), borrowed(territories)
-    topology, labelled = embedding.topology, borrowed(labelled)
-    points, count = np.empty((4 * ROWS, 3)), 0
+    topology, territories = borrowed(topology), borrowed(territories)
+    geometry, labelled = topology.geometry, borrowed(labelled)
+    weights, count = np.empty((4 * ROWS, 3)), 0
     chains, sources, chain_count = room_for_chains(ROWS), np.empty((ROWS, 2), np.int32), 0
     for k in range(first, last):
         face = territories.faces[k]
@@ -100,13 +101,16 @@ def trace_borders(
             u, v, left, right = ends_of_piece(curves, straight, own.parent, i)
             if min(left, right) < 0:
                 continue
-            begin = count
-            points, count = put_node(embedding, labelled, face, own, u, points, count)
+            begin, weights = count, with_room(weights, count + 1)
+            put_node(geometry, labelled, face, k, own, u, weights, count)
+            count += 1
             if i < len(curves):
-                points, count = trace_bisector(
-                    embedding, face, curves[i], chord_error, points, count
+                weights, count = trace_bisector(
+                    geometry, face, curves[i], chord_error, weights, count
                 )
-            points, count = put_node(embedding, labelled, face, own, v, points, count)
+            weights = with_room(weights, count + 1)
+            put_node(geometry, labelled, face, k, own, v, weights, count)
+            count += 1
             chains = with_chain(
                 chains, chain_count, count - begin, face,
                 global_node(own, u, next_node), global_node(own, v, next_node),
@@ -116,7 +120,7 @@ def trace_borders(
             chain_count += 1
         next_node += len(own.places)
     chains = first_chains(chains, chain_count)
-    return TracedBorders(points[:count], chains, sources[:chain_count], next_node)
+    return TracedBorders(weights[:count], chains, sources[:chain_count], next_node)
 
 
 @kernel
@@ -168,18 +172,13 @@ def global_node(nodes: FaceNodes, node: int, next_node: int) -> int:
 
 @kernel
 def put_node(
-    embedding: Any,
-    labelled: Any,
-    face: int,
-    nodes: FaceNodes,
-    node: int,
-    points: Floats,
-    count: int,
-) -> Any:
-    """Append the point of a node of a face to ``points``; return them and their number."""
+    geometry: Floats, labelled: Any, face: int, k: int, nodes: FaceNodes, node: int,
+    weights: Floats, count: int,
+) -> None:  # fmt: skip
+    """Write the weights of a node of the k-th face to row ``count``."""
     nodes, crossing = borrowed(nodes), crossing_of(nodes, node)
     if crossing >= 0:
-        return put_crossing(embedding, labelled.crossings, crossing, points, count)
-    points = with_room(points, count + 1)
-    put_in_face(embedding, face, nodes.places[node, 0], nodes.places[node, 1], points, count)
-    return points, count + 1
+        put_crossing(geometry, labelled.crossings, crossing, k, weights, count)
+    else:
+        x, y = nodes.places[node, 0], nodes.places[node, 1]
+        put_in_face(geometry, face, x, y, weights, count)

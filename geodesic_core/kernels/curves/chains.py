@@ -10,6 +10,7 @@ import numpy as np
 
 from geodesic_core.arrays import Flags, Floats, Ints, Longs
 from geodesic_core.kernels.curves.crossings import faces_at
+from geodesic_core.kernels.curves.face_points import copy_weights, way_between
 from geodesic_core.kernels.curves.rows import with_room
 from geodesic_core.kernels.jit import inlined, kernel
 
@@ -17,8 +18,8 @@ from geodesic_core.kernels.jit import inlined, kernel
 class Chains(NamedTuple):
     """The chains of all faces."""
 
-    points: Floats
-    """(N, 3)"""
+    weights: Floats
+    """(N, 3): the points of each, by their weights in its face"""
     first: Longs
     """(c + 1,): the first point of each chain; where the last one ends"""
     nodes: Ints
@@ -39,12 +40,19 @@ class ChainRows(NamedTuple):
 
 
 class Lines(NamedTuple):
-    """Chains joined to lines."""
+    """Chains joined to lines.
 
-    points: Floats
-    """(N, 3)"""
+    Where a line goes from face to face, its point has weights in both.
+    """
+
+    arriving: Floats
+    """(N, 3): weights of each point in the face that the line comes from; of the first point of an
+    open line, in the face that it goes into"""
+    leaving: Floats
+    """(N, 3): weights of each point in ``faces``"""
     faces: Ints
-    """(N,): the face behind each point; -1 behind the last one of an open line"""
+    """(N,): the face that the line goes into at each point; at the last one of an open line, that
+    which it comes from"""
     first: Longs
     """(L + 1,): the first point of each line; where the last one ends"""
     closed: Flags
@@ -121,105 +129,114 @@ def row_at(chains: Any, end: int) -> int:
     return chains.first[chain] if end % 2 == 0 else chains.first[chain + 1] - 1
 
 
-@inlined
-def copy_point(source: Floats, row: int, points: Floats, target: int) -> None:
-    """Copy a point from a row of ``source`` to a row of ``points``."""
-    for axis in range(3):
-        points[target, axis] = source[row, axis]
-
-
 @kernel
-def link_crossing_chains(links: Ints, half_edges: Ints, chains: Any, shortest: float) -> Lines:
+def link_crossing_chains(topology: Any, half_edges: Ints, chains: Any, shortest: float) -> Lines:
     """Join chains whose nodes are crossings, on ``half_edges``, to lines, as `link_chains` does.
 
-    An open line begins where its first chain does, wherever there is such a chain.
+    Chains have the lower values on their left, and lines the higher ones, wherever all faces of a
+    line run the same way.
     """
     count = len(chains.nodes)
-    partner = partners(chains.nodes, nodes_at_seams(links, half_edges, len(half_edges)))
+    partner = partners(chains.nodes, nodes_at_seams(topology.links, half_edges, len(half_edges)))
     order = np.empty(2 * count, np.int32)
     for chain in range(count):
-        order[chain], order[count + chain] = 2 * chain, 2 * chain + 1
+        order[chain], order[count + chain] = 2 * chain + 1, 2 * chain
     done = np.zeros(count, np.uint8)
-    return link_chains(chains, partner, order, done, half_edges, shortest)
+    return link_chains(topology.geometry, chains, partner, order, done, half_edges, shortest)
 
 
 @kernel
 def link_chains(
-    chains: Any, partner: Ints, order: Ints, done: Flags, place_of: Ints, shortest: float
-) -> Lines:
+    geometry: Floats, chains: Any, partner: Ints, order: Ints, done: Flags, place_of: Ints,
+    shortest: float,
+) -> Lines:  # fmt: skip
     """Join chains to lines: first the open ones, then those that are closed.
 
     Lines begin at the ends of chains in the given ``order``, and go on as ``partner`` says. Chains
-    that are ``done`` are left out; the call flags all others. Points nearer than ``shortest`` to
-    the one before are left out, and so are lines of too few points. Where all points of an open
-    line are as near, both ends are left, if they are apart and their nodes have different places
-    by ``place_of``. From a place back to itself such a line may be rounding.
+    that are ``done`` are left out; the call flags all others. Points between two nodes that are
+    nearer than ``shortest`` to the one before are left out. So are closed lines with fewer than
+    three points farther apart, and open ones with fewer than two, unless their nodes have different
+    places by ``place_of``: from a place back to itself such a line may be rounding.
     """
-    count, lines, total = len(chains.nodes), 0, 0
-    points, faces = np.empty((len(chains.points), 3)), np.empty(len(chains.points), np.int32)
-    first, closed = np.zeros(count + 1, np.int64), np.zeros(count, np.uint8)
-    ends = np.empty((count, 2), np.int32)
+    count, line_count, total = len(chains.nodes), 0, 0
+    lines = room_for_lines(len(chains.weights), count)
     for is_closed in range(2):
         for i in range(len(order)):
             start = order[i]
             if done[start // 2] or (partner[start] >= 0) != is_closed:
                 continue
-            begin, end, last = total, start, start
+            begin, end, last, apart = total, start, start, 0
             while end >= 0 and not done[end // 2]:
                 done[end // 2] = 1
-                total = append_chain(chains, end, shortest, points, faces, begin, total)
-                last = end ^ 1
+                total, more = append_chain(geometry, chains, end, shortest, lines, begin, total)
+                last, apart = end ^ 1, apart + more
                 end = partner[last]
             if is_closed:
                 total -= 1  # the first point again
-            elif total == begin + 1 and lead_apart(chains, place_of, start, last):
-                copy_point(chains.points, row_at(chains, start), points, begin)
-                copy_point(chains.points, row_at(chains, last), points, begin + 1)
-                faces[begin] = chains.faces[start // 2]
-                total += 1
-            if total - begin < (3 if is_closed else 2):
+                copy_weights(lines.arriving, total, lines.arriving, begin)
+                is_line = apart >= 3
+            else:
+                is_line = apart >= 1 or lead_apart(chains, place_of, start, last)
+            if not is_line:
                 total = begin
                 continue
-            if not is_closed:
-                faces[total - 1] = -1
-            closed[lines], ends[lines, 0], ends[lines, 1] = is_closed, start, last
-            lines += 1
-            first[lines] = total
-    return Lines(points[:total], faces[:total], first[: lines + 1], closed[:lines], ends[:lines])
+            lines.closed[line_count] = is_closed
+            lines.ends[line_count, 0], lines.ends[line_count, 1] = start, last
+            line_count += 1
+            lines.first[line_count] = total
+    return Lines(
+        lines.arriving[:total], lines.leaving[:total], lines.faces[:total],
+        lines.first[: line_count + 1], lines.closed[:line_count], lines.ends[:line_count],
+    )  # fmt: skip
+
+
+@inlined
+def room_for_lines(points: int, lines: int) -> Lines:
+    """Return room for some points of some lines."""
+    return Lines(
+        np.empty((points, 3)),
+        np.empty((points, 3)),
+        np.empty(points, np.int32),
+        np.zeros(lines + 1, np.int64),
+        np.zeros(lines, np.uint8),
+        np.empty((lines, 2), np.int32),
+    )
 
 
 @inlined
 def lead_apart(chains: Any, place_of: Ints, start: int, last: int) -> bool:
-    """Tell whether a line from one end of a chain to another leads to another place and point."""
+    """Tell whether a line from one end of a chain to another leads to another place."""
     u, v = chains.nodes[start // 2, start % 2], chains.nodes[last // 2, last % 2]
-    a, b, apart = row_at(chains, start), row_at(chains, last), 0.0
-    for axis in range(3):
-        apart = max(apart, abs(chains.points[a, axis] - chains.points[b, axis]))
-    return place_of[u] != place_of[v] and apart > 0.0
+    return place_of[u] != place_of[v]
 
 
 @inlined
 def append_chain(
-    chains: Any, end: int, shortest: float, points: Floats, faces: Ints, begin: int, total: int
-) -> int:
+    geometry: Floats, chains: Any, end: int, shortest: float, lines: Any, begin: int, total: int
+) -> tuple[int, int]:
     """Append a chain, from one of its ends on, to the line that begins at point ``begin``.
 
-    Fills ``points`` and ``faces`` from ``total`` on; returns the new total.
+    Fills ``lines`` from ``total`` on; returns the new total, and how many points are farther from
+    the one before than ``shortest``.
     """
-    chain = end // 2
-    lo, hi = chains.first[chain], chains.first[chain + 1]
-    for i in range(hi - lo):
-        source = lo + i if end % 2 == 0 else hi - 1 - i
-        if total > begin:
-            way = 0.0
-            for axis in range(3):
-                way += (chains.points[source, axis] - points[total - 1, axis]) ** 2
-            if way > shortest * shortest:
-                faces[total - 1] = chains.faces[chain]
-            elif i == hi - lo - 1:  # the node replaces the point that is nearly there
-                total -= 1
-            else:
-                continue
-        copy_point(chains.points, source, points, total)
+    face, weights, first = chains.faces[end // 2], chains.weights, row_at(chains, end)
+    if total == begin:
+        copy_weights(weights, first, lines.arriving, total)
         total += 1
-    return total
+    copy_weights(weights, first, lines.leaving, total - 1)  # where the line goes on
+    lines.faces[total - 1] = face
+    count = chains.first[end // 2 + 1] - chains.first[end // 2]
+    last, step, apart = first, 1 - 2 * (end % 2), 0
+    for i in range(1, count):
+        row = first + i * step
+        is_apart = way_between(geometry, face, weights, last, row) > shortest
+        if not is_apart and i < count - 1:
+            continue
+        apart += is_apart
+        if is_apart or last == first:  # else the node replaces the point that is nearly there
+            total += 1
+        copy_weights(weights, row, lines.arriving, total - 1)
+        copy_weights(weights, row, lines.leaving, total - 1)
+        lines.faces[total - 1] = face
+        last = row
+    return total, apart

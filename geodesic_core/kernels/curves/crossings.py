@@ -12,16 +12,7 @@ import numpy as np
 from geodesic_core.arrays import Flags, Floats, Ints
 from geodesic_core.kernels.curves.rows import with_room
 from geodesic_core.kernels.jit import inlined, kernel
-from geodesic_core.kernels.mesh.half_edges import (
-    COS_LEFT,
-    HEAD,
-    LENGTH,
-    LENGTH_LEFT,
-    SIN_LEFT,
-    TAIL,
-    half_edge_in_face,
-    next_around,
-)
+from geodesic_core.kernels.mesh.half_edges import LENGTH, TAIL, half_edge_in_face, next_around
 
 
 class Crossings(NamedTuple):
@@ -151,33 +142,19 @@ def crossings_around(geometry: Floats, crossings: Any, face: int, row: int) -> F
     return FaceCrossings(places, ids, turned)
 
 
-@inlined
-def put_in_face(embedding: Any, face: int, x: float, y: float, points: Floats, row: int) -> None:
-    """Write the point of a face at (x, y) in its frame, pulled into the face, to a row."""
-    links, geometry = embedding.topology.links, embedding.topology.geometry
-    positions = embedding.positions
-    h = 3 * face
-    tail, head, apex = links[h, TAIL], links[h, HEAD], links[h + 1, HEAD]
-    ax = geometry[h, LENGTH_LEFT] * geometry[h, COS_LEFT]
-    ay = geometry[h, LENGTH_LEFT] * geometry[h, SIN_LEFT]
-    up = min(max(y / ay, 0.0), 1.0) if ay > 0.0 else 0.0
-    along = min(max((x - up * ax) / geometry[h, LENGTH], 0.0), 1.0 - up)
-    for axis in range(3):
-        start = positions[tail, axis]
-        rise = along * (positions[head, axis] - start) + up * (positions[apex, axis] - start)
-        points[row, axis] = start + rise
-
-
 @kernel
-def put_crossing(embedding: Any, crossings: Any, c: int, points: Floats, count: int) -> Any:
-    """Append the point of a crossing to ``points``: the same to the bit for all faces.
+def put_crossing(
+    geometry: Floats, crossings: Any, c: int, row: int, weights: Floats, count: int
+) -> None:
+    """Write the weights that a crossing has in a face, which has a row, to row ``count``.
 
-    Returns the points, which may be in a larger array, and their number.
+    Both ends of the edge have the same weights in all of its faces, to the bit.
     """
-    links, positions, h = embedding.topology.links, embedding.positions, crossings.half_edges[c]
-    share = crossings.positions[c] / embedding.topology.geometry[h, LENGTH]
-    points = with_room(points, count + 1)
-    for axis in range(3):
-        start, end = positions[links[h, TAIL], axis], positions[links[h, HEAD], axis]
-        points[count, axis] = (1.0 - share) * start + share * end
-    return points, count + 1
+    i = 0
+    while not 0 <= c - crossings.first[3 * row + i] < crossings.number[3 * row + i]:
+        i += 1
+    share = min(crossings.positions[c] / geometry[crossings.half_edges[c], LENGTH], 1.0)
+    is_turned = crossings.turned[3 * row + i]
+    weights[count, i] = share if is_turned else 1.0 - share
+    weights[count, (i + 1) % 3] = 1.0 - share if is_turned else share
+    weights[count, (i + 2) % 3] = 0.0

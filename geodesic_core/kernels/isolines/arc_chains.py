@@ -8,13 +8,13 @@ import numpy as np
 from geodesic_core.arrays import Floats
 from geodesic_core.kernels.curves.chains import (
     ChainRows,
-    copy_point,
     first_chains,
     room_for_chains,
     with_chain,
 )
 from geodesic_core.kernels.curves.conics import END, START, Q, is_line, point_on
-from geodesic_core.kernels.curves.crossings import crossings_around, put_crossing, put_in_face
+from geodesic_core.kernels.curves.crossings import crossings_around, put_crossing
+from geodesic_core.kernels.curves.face_points import copy_weights, put_in_face
 from geodesic_core.kernels.curves.joining import (
     LooseEnds,
     join,
@@ -59,45 +59,49 @@ def step_of(radius: float, chord_error: float) -> float:
 
 @kernel
 def trace_arc(
-    embedding: Any, face: int, arc: Floats, error: float, points: Floats, count: int
+    geometry: Floats, face: int, arc: Floats, error: float, weights: Floats, count: int
 ) -> Any:
-    """Append an arc's points to ``points``, both ends included; return them and their number."""
+    """Append an arc's points to ``weights``, both ends included; return them and their number."""
     width, chords = arc[END] - arc[START], 1
     if not is_line(arc):
         chords = max(math.ceil(width / step_of(arc[Q], error)), 1)
-    points = with_room(points, count + chords + 1)
+    weights = with_room(weights, count + chords + 1)
     for i in range(chords + 1):
         x, y = point_on(arc, arc[START] + width * (i / chords))
-        put_in_face(embedding, face, x, y, points, count + i)
-    return points, count + chords + 1
+        put_in_face(geometry, face, x, y, weights, count + i)
+    return weights, count + chords + 1
 
 
 @kernel
 def chain_arcs(
-    embedding: Any, distance: Floats, cuts: Any, crossings: Any, level: float, chord_error: float,
+    topology: Any, distance: Floats, cuts: Any, crossings: Any, level: float, chord_error: float,
     first: int, last: int,
 ) -> tuple[Floats, ChainRows]:  # fmt: skip
     """Join the arcs of each of the cut faces from row ``first`` up to ``last`` to chains.
 
-    Returns the points of all chains, and the chains. O(n²) for n arcs in a face.
+    Returns the weights of all chains' points, and the chains. O(n²) for n arcs in a face.
     """
-    topology = embedding.topology
-    points, count = np.empty((4 * ROWS, 3)), 0
+    geometry = topology.geometry
+    weights, count = np.empty((4 * ROWS, 3)), 0
     chains, chain_count = room_for_chains(ROWS), 0
     for k in range(first, last):
         face, arcs = cuts.faces[k], cuts.arcs[cuts.first_arc[k] : cuts.first_arc[k + 1]]
-        around = crossings_around(topology.geometry, crossings, face, k)
+        around = crossings_around(geometry, crossings, face, k)
         ends, starts = ends_in_face(topology, distance, arcs, around, face, level)
         joined, done = join(ends.places, starts.places), np.zeros(len(arcs), np.uint8)
         for e in range(len(arcs), len(joined)):  # chains that come in over an edge
             begin, u, s = count, ends.ids[e], joined[e]
-            points, count = put_crossing(embedding, crossings, u, points, count)
+            weights = with_room(weights, count + 1)
+            put_crossing(geometry, crossings, u, k, weights, count)
+            count += 1
             while s < len(arcs):
-                points, count = trace_arc(embedding, face, arcs[s], chord_error, points, count)
+                weights, count = trace_arc(geometry, face, arcs[s], chord_error, weights, count)
                 done[s] = 1
                 s = joined[s]
             v = starts.ids[s]
-            points, count = put_crossing(embedding, crossings, v, points, count)
+            weights = with_room(weights, count + 1)
+            put_crossing(geometry, crossings, v, k, weights, count)
+            count += 1
             chains = with_chain(chains, chain_count, count - begin, face, u, v)
             chain_count += 1
         for i in range(len(arcs)):  # chains that are closed within the face
@@ -105,12 +109,12 @@ def chain_arcs(
                 continue
             begin, s = count, i
             while not done[s]:
-                points, count = trace_arc(embedding, face, arcs[s], chord_error, points, count)
+                weights, count = trace_arc(geometry, face, arcs[s], chord_error, weights, count)
                 done[s] = 1
                 s = joined[s]
-            points = with_room(points, count + 1)
-            copy_point(points, begin, points, count)
+            weights = with_room(weights, count + 1)
+            copy_weights(weights, begin, weights, count)
             count += 1
             chains = with_chain(chains, chain_count, count - begin, face, -1, -1)
             chain_count += 1
-    return points[:count], first_chains(chains, chain_count)
+    return weights[:count], first_chains(chains, chain_count)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from geodesic_core.arrays import Flags, Floats, Ints, Longs, aligned_rows
-from geodesic_core.kernels.jit import kernel
+from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
     APEX_ANGLE,
@@ -496,25 +496,45 @@ def label_components(faces: Ints, component: Ints) -> None:
             component[v] = component[parent[v]]
 
 
+@inlined
+def next_on_boundary(links: Ints, h: int) -> int:
+    """Return the boundary half-edge at the head of h in the same fan; -1 for an irregular edge.
+
+    Around the head, clockwise, to the boundary on the other side of the fan.
+    """
+    h = following(h)
+    while links[h, OPPOSITE] >= 0:
+        h = following(links[h, OPPOSITE])
+    return h if links[h, OPPOSITE] == NO_FACE else -1
+
+
 @kernel
-def count_boundary_loops(links: Ints) -> int:
-    """Count the closed loops of boundary half-edges."""
-    seen = np.zeros(links.shape[0], np.uint8)
-    loops = 0
-    for start in range(links.shape[0]):
-        if links[start, OPPOSITE] != NO_FACE or seen[start]:
-            continue
-        loops += 1
-        h = start
-        while not seen[h]:
-            seen[h] = 1
-            # Around the head, clockwise, to the boundary on the other side of the same fan
-            h = following(h)
-            while links[h, OPPOSITE] >= 0:
-                h = following(links[h, OPPOSITE])
-            if links[h, OPPOSITE] == IRREGULAR:
-                break
-    return loops
+def trace_boundary(links: Ints) -> tuple[Ints, Longs, int]:
+    """Return the boundary half-edges, line by line, where lines begin, and how many are open.
+
+    The open ones, which lead from one irregular edge to another, come first; then closed loops.
+    """
+    size, count, lines, opened = links.shape[0], 0, 0, 0
+    follows, seen = np.zeros(size, np.uint8), np.zeros(size, np.uint8)
+    for h in range(size):
+        if links[h, OPPOSITE] == NO_FACE:
+            count += 1
+            g = next_on_boundary(links, h)
+            if g >= 0:
+                follows[g] = 1
+    half_edges, first, count = np.empty(count, np.int32), np.zeros(count + 1, np.int64), 0
+    for is_closed in range(2):
+        for start in range(size):
+            if links[start, OPPOSITE] != NO_FACE or seen[start] or follows[start] != is_closed:
+                continue
+            h = start
+            while h >= 0 and not seen[h]:
+                seen[h], half_edges[count] = 1, h
+                h = next_on_boundary(links, h)
+                count += 1
+            lines, opened = lines + 1, opened + 1 - is_closed
+            first[lines] = count
+    return half_edges, first[: lines + 1], opened
 
 
 @kernel

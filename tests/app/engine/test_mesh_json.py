@@ -6,12 +6,21 @@ from app.errors import ProblemError
 
 
 def test_reads_vertices_and_faces() -> None:
-    vertices, faces = read_json_mesh(
-        b'{"vertices": [[0, 0, 0], [1.5, 0, 0]], "faces": [[0, 1, 1]]}'
-    )
+    read = read_json_mesh(b'{"vertices": [[0, 0, 0], [1.5, 0, 0]], "faces": [[0, 1, 1]]}')
 
-    np.testing.assert_array_equal(vertices, [[0, 0, 0], [1.5, 0, 0]])
-    np.testing.assert_array_equal(faces, [[0, 1, 1]])
+    np.testing.assert_array_equal(read.vertices, [[0, 0, 0], [1.5, 0, 0]])
+    np.testing.assert_array_equal(read.faces, [[0, 1, 1]])
+    assert read.lengths is None
+
+
+def test_reads_lengths_in_place_of_vertices_or_beside_them() -> None:
+    alone = read_json_mesh(b'{"faces": [[0, 1, 2]], "lengths": [[3, 4, 5.5]]}')
+    np.testing.assert_array_equal(alone.lengths, [[3, 4, 5.5]])
+    assert alone.vertices is None
+    drawn = read_json_mesh(
+        b'{"faces": [[0, 0, 0]], "lengths": [[3, 4, 5]], "vertices": [[1, 2, 3]]}'
+    )
+    np.testing.assert_array_equal(drawn.vertices, [[1, 2, 3]])
 
 
 @pytest.mark.parametrize(
@@ -37,6 +46,10 @@ def test_reads_vertices_and_faces() -> None:
         (b'{"vertices": [], "faces": []}', "invalid_request", "/vertices"),
         (b'{"vertices": [[0, 0, 0]], "faces": [[0, 1.5, 2]]}', "invalid_request", "/faces/0"),
         (b'{"vertices": [[0, 0, 0]], "faces": [[0, 1, 2, 3]]}', "invalid_request", "/faces/0"),
+        (b'{"lengths": [[1, 1, 1]]}', "invalid_request", "/faces"),
+        (b'{"faces": [[0, 1, 2]], "lengths": null}', "invalid_request", "/lengths"),
+        (b'{"faces": [[0, 1, 2]], "lengths": [[1, 1]]}', "invalid_request", "/lengths/0"),
+        (b'{"faces": [[0, 1, 2]], "lengths": [[1, true, 1]]}', "invalid_request", "/lengths/0"),
     ],
 )
 def test_says_what_is_wrong_where(body: bytes, code: str, place: str | None) -> None:

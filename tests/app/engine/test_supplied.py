@@ -55,9 +55,7 @@ class Machine:
 async def machine_at(folder: Path) -> AsyncIterator[Machine]:
     store = BucketStore(Bucket(MemoryStore()), folder, 10**9, "memory")
     with store.owned():
-        written = MeshStore(folder).write_aside(
-            samples.plane(50_000), folder / TEMPORARY / "mesh", None
-        )
+        written = MeshStore(folder).write_aside(samples.plane(50_000), folder / TEMPORARY / "mesh")
         assert await store.send_mesh(written)
         await store.meshes.put(written)
         work = run_query(distances_query(written.mesh_id), NPY)

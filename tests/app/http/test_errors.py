@@ -19,7 +19,7 @@ from tests.support.service import check_problem
 CONTRACT = {
     400: {"malformed_body", "malformed_request", "idempotency_key_unused"},
     401: {"unauthorized"},
-    403: {"forbidden", "origin_not_allowed"},
+    403: {"origin_not_allowed"},
     404: {"mesh_not_found", "job_not_found", "not_found"},
     405: {"method_not_allowed"},
     406: {"not_acceptable"},
@@ -29,7 +29,10 @@ CONTRACT = {
     415: {"unsupported_media_type"},
     416: {"range_not_satisfiable"},
     421: {"host_not_allowed"},
-    422: {"invalid_request", "invalid_mesh", "invalid_point", "limit_exceeded", "memory_limit"},
+    422: {
+        *("invalid_request", "invalid_mesh", "invalid_point", "limit_exceeded", "memory_limit"),
+        "not_embedded",
+    },
     429: {"rate_limited", "quota_exceeded"},
     431: {"header_too_large"},
     500: {"worker_died", "mesh_damaged", "internal_error"},

@@ -152,13 +152,3 @@ def test_many_addresses_take_bounded_memory_and_no_thread() -> None:
 )
 def test_callers_without_a_key_are_their_address(host: str | None, name: str) -> None:
     assert caller_at(host) == Caller(name, has_key=False)
-
-
-def test_what_belongs_to_whom() -> None:
-    anyone = caller_at("10.0.0.7")
-
-    assert (ALICE.owner, anyone.owner) == ("alice", None)
-    assert ALICE.may_delete("alice")
-    assert ALICE.may_delete(None)
-    assert not BOB.may_delete("alice")
-    assert anyone.may_delete("alice")  # no keys are asked for

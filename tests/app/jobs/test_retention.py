@@ -1,6 +1,7 @@
 """Finished jobs stay for their time, whatever happens to the clock."""
 
 from collections import Counter
+from collections.abc import Awaitable, Callable
 from datetime import UTC, datetime, timedelta
 from typing import Any, cast
 
@@ -30,17 +31,17 @@ def calendar(monkeypatch: pytest.MonkeyPatch) -> Calendar:
     return calendar
 
 
-def finished_job(owner: str | None = None) -> Job:
-    return new_job(owner).running(0.0).successful("a result")
+def finished_job(client: str = "") -> Job:
+    return new_job(client).running(0.0).successful("a result")
 
 
 class Pins(Counter[str]):
     """Counts the pins of each result, as a store of results does."""
 
-    def pin(self, name: str, _owner: str | None) -> None:
+    def pin(self, name: str, _client: str) -> None:
         self[name] += 1
 
-    def unpin(self, name: str, _owner: str | None) -> None:
+    def unpin(self, name: str, _client: str) -> None:
         self[name] -= 1
 
 
@@ -60,7 +61,6 @@ def test_a_clock_that_is_moved_changes_nothing(
     after = finished_job()
     jobs.add(EndedJob.of(after))
 
-    assert jobs.seconds_to_first(None) == 3000
     clock.now += 2999
     assert jobs.due() == []
     clock.now += 1
@@ -69,7 +69,30 @@ def test_a_clock_that_is_moved_changes_nothing(
     assert jobs.due() == [before.id, after.id]
 
 
-def test_what_finished_before_the_start(clock: Clock, calendar: Calendar) -> None:
+def records_of(*jobs: Job) -> Callable[[], Awaitable[list[EndedJob]]]:
+    async def read() -> list[EndedJob]:
+        return list(map(EndedJob.of, jobs))
+
+    return read
+
+
+@pytest.mark.anyio
+async def test_a_job_that_finishes_while_records_are_read_stays() -> None:
+    """They were read before, and do not have it."""
+    jobs = retention_of(pins := Pins())
+
+    async def read() -> list[EndedJob]:
+        jobs.add(EndedJob.of(finished_job()))
+        return []
+
+    await jobs.keep_up(read)
+    assert pins == {"a result": 1}
+    await jobs.keep_up(records_of())
+    assert pins == {"a result": 0}
+
+
+@pytest.mark.anyio
+async def test_what_finished_before_the_start(clock: Clock, calendar: Calendar) -> None:
     """By the calendar one job is as old as it can be, one is younger, and one is yet to end."""
     moved = (timedelta(hours=-1), timedelta(minutes=-50), TEN_YEARS)
     ended = []
@@ -79,37 +102,17 @@ def test_what_finished_before_the_start(clock: Clock, calendar: Calendar) -> Non
     calendar.moved = timedelta()
 
     jobs = retention_of(pins := Pins())
-    jobs.keep_up(map(EndedJob.of, ended))
-    jobs.keep_up(map(EndedJob.of, ended))
+    await jobs.keep_up(records_of(*ended))
+    await jobs.keep_up(records_of(*ended))
     assert pins == {"a result": 3}
 
     assert jobs.due() == [old.id]
     clock.now += 601
     assert jobs.due() == [old.id, younger.id]
-    jobs.keep_up([EndedJob.of(to_come)])
+    await jobs.keep_up(records_of(to_come))
     assert pins == {"a result": 1}
-    assert jobs.seconds_to_first(None) == 2999
     clock.now += 2999
     assert jobs.due() == [to_come.id]
-
-
-def test_the_first_job_of_each_owner(clock: Clock) -> None:
-    jobs = retention_of(Pins())
-    assert jobs.seconds_to_first("alice") is None
-    first = finished_job("alice")
-    jobs.add(EndedJob.of(first))
-    clock.now += 0.5
-    for owner in ("alice", "bob", None):
-        jobs.add(EndedJob.of(finished_job(owner)))
-
-    assert jobs.seconds_to_first("alice") == jobs.seconds_to_first("bob") == 3600
-    clock.now += 100
-    assert jobs.seconds_to_first("alice") == 3500
-    assert jobs.seconds_to_first("carol") is None
-    jobs.discard(first.id)
-    assert jobs.seconds_to_first("alice") == 3500
-    clock.now += 2 * HOUR_S
-    assert jobs.seconds_to_first("alice") == 1, "it is about to be removed"
 
 
 @pytest.mark.parametrize("moved", [TEN_YEARS, -TEN_YEARS])

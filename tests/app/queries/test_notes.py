@@ -30,6 +30,8 @@ QUESTIONS: list[tuple[str, dict[str, Any], list[str]]] = [
     ("isolines", {"sources": [FAR], "count": 2}, ["Source 0"]),
     ("borders", {"sources": [NEAR, FAR]}, ["Source 1"]),
     ("nearest", {"source": 0, "candidates": [NEAR, FAR]}, ["Candidate 1"]),
+    ("log_map", {"source": FAR, "x_axis": 3}, ["The source"]),
+    ("trace", {"starts": [NEAR, FAR], "directions": [0.1], "lengths": [0.1]}, ["Start 1"]),
     ("matrix", {"sources": "all", "targets": [NEAR, FAR]}, ["Target 1"]),
     ("matrix", {"sources": [NEAR, FAR], "targets": "all"}, ["Source 1"]),
     ("matrix", {"sources": [FAR], "targets": [0], "layout": "pairs"}, ["Source 0"]),

@@ -19,7 +19,7 @@ def test_pulls_at_the_same_time_leave_no_lock(tmp_path: Path) -> None:
 
     async def main() -> None:
         written = MeshStore(one.folder).write_aside(
-            gc.samples.plane(20), one.folder / TEMPORARY / "mesh", owner=None
+            gc.samples.plane(20), one.folder / TEMPORARY / "mesh"
         )
         await one.send_mesh(written)
         await one.meshes.put(written)

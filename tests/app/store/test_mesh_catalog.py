@@ -48,11 +48,9 @@ def files_in(root: Path) -> set[str]:
 
 
 @contextmanager
-def opened(
-    root: Path, capacity: int = 2**60, *, evicts: bool = False, quota: int | None = None
-) -> Iterator[Opened]:
+def opened(root: Path, capacity: int = 2**60, *, evicts: bool = False) -> Iterator[Opened]:
     store = Store(root)
-    catalog = MeshCatalog(store.meshes, capacity, evicts=evicts, quota=quota)
+    catalog = MeshCatalog(store.meshes, capacity, evicts=evicts)
     with store.owned():
         (root / "meshes").mkdir(exist_ok=True)
         Scratch(root, 1).prepare()
@@ -66,14 +64,12 @@ def sizes_in(store: MeshStore) -> Mapping[str, int]:
     return {mesh_id: record.size for mesh_id, record in found.items()}
 
 
-def add(
-    opened: Opened, mesh: gc.TriangleMesh, owner: str | None = None
-) -> tuple[str, CatalogChange]:
+def add(opened: Opened, mesh: gc.TriangleMesh) -> tuple[str, CatalogChange]:
     store, catalog = opened
 
     async def run() -> tuple[str, CatalogChange]:
         async with scratch_folder(store) as folder:
-            written = store.write_aside(mesh, folder / "mesh", owner, "plane")
+            written = store.write_aside(mesh, folder / "mesh", "plane")
             change = await catalog.add(written)
             assert change is not None
             return written.mesh_id, change
@@ -118,56 +114,14 @@ def test_the_bound_holds_for_what_a_former_service_left(tmp_path: Path) -> None:
             add(store, plane(18))
 
 
-@pytest.mark.parametrize("restarts", [False, True])
-@pytest.mark.parametrize("owner", ["alice", None])
-def test_the_quota_bounds_what_each_owner_stored_first(
-    tmp_path: Path, owner: str | None, restarts: bool
-) -> None:
-    root = tmp_path / "store"
-    with opened(tmp_path / "sizes") as sizing:
-        small, large = (
-            add(sizing, plane(faces), owner) and list(sizes_in(sizing[0]).values())[-1]
-            for faces in (50, 200)
-        )
-    quota = small + large - 100  # manifests of other owners differ by some bytes
-    with opened(root, quota=quota) as store:
-        mesh_id, _ = add(store, plane(50), owner)
-        if not restarts:
-            check_quota(store, mesh_id, owner, small + large, quota)
-    if restarts:
-        (root / "meshes" / "no mesh").mkdir()
-        with opened(root, quota=quota) as store:
-            check_quota(store, mesh_id, owner, small + large, quota)
-
-
-def check_quota(store: Opened, mesh_id: str, owner: str | None, wanted: int, quota: int) -> None:
-    """Check that an owner is refused ``plane(200)`` beside ``mesh_id``, and nobody else is."""
-    before = files_in(store[0].folder)
-    with pytest.raises(ProblemError) as caught:
-        add(store, plane(200), owner)
-    problem = caught.value.problem
-    assert (problem.code, problem.status) == ("quota_exceeded", 507)
-    assert (problem.limit, problem.actual) == (quota, wanted)
-    assert problem.setting == "quota_bytes"
-    assert files_in(store[0].folder) == before
-
-    assert add(store, plane(50), owner) == (mesh_id, CatalogChange(is_new=False))
-    other, change = add(store, plane(200), "bob")
-    assert change.is_new
-    assert not add(store, plane(200), owner)[1].is_new, "it is Bob's, and counts for him"
-    anyio.run(store[1].delete, other)
-    anyio.run(store[1].delete, mesh_id)
-    assert add(store, plane(200), owner)[1].is_new
-
-
-def test_of_two_uploads_at_the_same_time_the_quota_takes_one(tmp_path: Path) -> None:
-    quota = sum(sizes(tmp_path, 50, 72)) - 1
-    with opened(tmp_path / "store", quota=quota) as (store, catalog):
+def test_of_two_uploads_at_the_same_time_the_store_takes_one(tmp_path: Path) -> None:
+    capacity = sum(sizes(tmp_path, 50, 72)) - 1
+    with opened(tmp_path / "store", capacity) as (store, catalog):
         ends: list[str] = []
 
         async def add_one(faces: int) -> None:
             async with scratch_folder(store) as folder:
-                written = store.write_aside(plane(faces), folder / "mesh", "alice")
+                written = store.write_aside(plane(faces), folder / "mesh", "plane")
                 await anyio.sleep(0)  # both are written before either is added
                 try:
                     await catalog.add(written)
@@ -181,29 +135,9 @@ def test_of_two_uploads_at_the_same_time_the_quota_takes_one(tmp_path: Path) -> 
                 group.start_soon(add_one, 72)
 
         anyio.run(add_both)
-        assert sorted(ends) == ["added", "quota_exceeded"]
+        assert sorted(ends) == ["added", "storage_full"]
         assert len(catalog.ids) == 1
-        assert catalog.total <= quota
-
-
-def test_a_mesh_is_healed_although_the_quota_is_less_by_now(tmp_path: Path) -> None:
-    with opened(tmp_path / "store") as store:
-        mesh_id, _ = add(store, plane(50), "alice")
-    (tmp_path / "store" / "meshes" / mesh_id / "faces.npy").write_bytes(b"")
-
-    with opened(tmp_path / "store", quota=1) as store:
-        assert add(store, plane(50), "alice")[1].is_healed
-        with pytest.raises(ProblemError):
-            add(store, plane(18), "alice")
-
-
-def test_nothing_is_evicted_to_make_room_in_a_quota(tmp_path: Path) -> None:
-    (size,) = sizes(tmp_path, 50)
-    with opened(tmp_path / "store", evicts=True, quota=size + 100) as store:
-        mesh_id, _ = add(store, plane(50), "alice")
-        with pytest.raises(ProblemError):
-            add(store, plane(72), "alice")
-        assert list(store[1].ids) == [mesh_id]
+        assert catalog.total <= capacity
 
 
 @pytest.mark.parametrize("restarts", [False, True])
@@ -256,7 +190,7 @@ def test_two_that_write_one_mesh(tmp_path: Path) -> None:
 
         async def run() -> list[bool]:
             async with scratch_folder(own) as folder:
-                both = [own.write_aside(plane(), folder / name, None) for name in "ab"]
+                both = [own.write_aside(plane(), folder / name) for name in "ab"]
                 kept = await asyncio.gather(*map(catalog.add, both))
                 return [each.is_new for each in kept]
 
@@ -274,9 +208,7 @@ def test_uploads_at_the_same_time_do_not_exceed_the_bound(tmp_path: Path) -> Non
 
         async def run() -> list[Any]:
             async with scratch_folder(own) as folder:
-                written = [
-                    own.write_aside(plane(faces), folder / str(faces), None) for faces in kinds
-                ]
+                written = [own.write_aside(plane(faces), folder / str(faces)) for faces in kinds]
                 return await asyncio.gather(*map(catalog.add, written), return_exceptions=True)
 
         kept = anyio.run(run)
@@ -290,7 +222,7 @@ def test_uploads_at_the_same_time_do_not_exceed_the_bound(tmp_path: Path) -> Non
 def test_a_mesh_removed_before_its_upload_ends_is_to_be_written_again(tmp_path: Path) -> None:
     with opened(tmp_path / "store") as store:
         mesh_id, _ = add(store, plane(50))
-        found = store[0].write_aside(plane(50), tmp_path / "aside", None)
+        found = store[0].write_aside(plane(50), tmp_path / "aside")
         assert found.folder is None
         anyio.run(store[1].delete, mesh_id)
         assert anyio.run(store[1].add, found) is None
@@ -302,7 +234,7 @@ def test_a_mesh_on_its_way_out_is_to_be_written_again(
     """Its folder is gone, and the catalog still has it, while its files are removed."""
     with opened(tmp_path / "store") as (store, catalog):
         mesh_id, _ = add((store, catalog), plane(50))
-        found = store.write_aside(plane(50), tmp_path / "aside", None)
+        found = store.write_aside(plane(50), tmp_path / "aside")
         assert found.folder is None
 
         async def run() -> CatalogChange | None:
@@ -432,7 +364,7 @@ def test_a_crash_at_any_step_leaves_a_mesh_whole_or_not_there(tmp_path: Path) ->
             folder.mkdir()
             count_down(patch, root, step, Crash())
             try:
-                written = store[0].write_aside(plane(), folder / "mesh", None)
+                written = store[0].write_aside(plane(), folder / "mesh")
                 anyio.run(store[1].add, written)
             except Crash:
                 has_crashed = True
@@ -455,7 +387,7 @@ def test_a_crash_at_any_step_leaves_a_mesh_whole_or_not_there(tmp_path: Path) ->
 
 @pytest.mark.slow
 def test_a_crash_while_a_mesh_is_healed_leaves_it_damaged_or_whole(tmp_path: Path) -> None:
-    mesh_id = store_mesh(tmp_path / "before", plane(), "alice")
+    mesh_id = store_mesh(tmp_path / "before", plane())
     folder = Path("meshes", mesh_id)
     expected = {path.name: path.read_bytes() for path in (tmp_path / "before" / folder).iterdir()}
     (tmp_path / "before" / folder / "faces.npy").write_bytes(b"")
@@ -468,7 +400,7 @@ def test_a_crash_while_a_mesh_is_healed_leaves_it_damaged_or_whole(tmp_path: Pat
             (root / "tmp" / "crashed").mkdir()
             count_down(patch, root, step, Crash())
             try:
-                written = store[0].write_aside(plane(), root / "tmp" / "crashed" / "mesh", "bob")
+                written = store[0].write_aside(plane(), root / "tmp" / "crashed" / "mesh")
                 change = anyio.run(store[1].add, written)
             except Crash:
                 has_crashed = True

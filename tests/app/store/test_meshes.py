@@ -70,12 +70,11 @@ def test_a_vertex_map_is_part_of_the_content(tmp_path: Path) -> None:
 
 def test_a_mesh_that_is_stored_is_not_written_again(meshes: MeshStore, tmp_path: Path) -> None:
     mesh = gc.TriangleMesh(*SQUARE)
-    mesh_id = store_mesh(tmp_path, mesh, "alice")
+    mesh_id = store_mesh(tmp_path, mesh)
 
-    written = meshes.write_aside(mesh, tmp_path / "aside", "bob")
+    written = meshes.write_aside(mesh, tmp_path / "aside")
 
     assert (written.mesh_id, written.folder) == (mesh_id, None)
-    assert written.manifest["owner"] == "alice"
     assert not (tmp_path / "aside").exists()
 
 
@@ -85,17 +84,17 @@ def test_a_damaged_array_is_noticed_and_healed_by_writing_the_mesh_again(
     meshes: MeshStore, tmp_path: Path, name: str, fault: Fault
 ) -> None:
     mesh = gc.TriangleMesh(*SQUARE)
-    mesh_id = store_mesh(tmp_path, mesh, "alice")
+    mesh_id = store_mesh(tmp_path, mesh)
     before = meshes.manifest(mesh_id)
 
     fault(meshes.array_file(mesh_id, name))
     assert code_of(lambda: meshes.open(mesh_id)) == "mesh_damaged"
     (found,) = damage_of(meshes, mesh_id)
     assert f"its array {name} has changed since it was written" in found
-    assert store_mesh(tmp_path, mesh, "bob") == mesh_id
+    assert store_mesh(tmp_path, mesh) == mesh_id
 
     assert damage_of(meshes, mesh_id) == []
-    assert meshes.manifest(mesh_id) == before, "its owner is the first one"
+    assert meshes.manifest(mesh_id) == before
     np.testing.assert_array_equal(meshes.open(mesh_id).mesh.vertices, mesh.vertices)
 
 
@@ -104,17 +103,16 @@ def test_a_damaged_manifest_is_noticed_and_healed_by_writing_the_mesh_again(
     meshes: MeshStore, tmp_path: Path, fault: Fault
 ) -> None:
     mesh = gc.TriangleMesh(*SQUARE)
-    mesh_id = store_mesh(tmp_path, mesh, "alice")
+    mesh_id = store_mesh(tmp_path, mesh)
     path = meshes.folder / mesh_id / "manifest.json"
 
     fault(path)
     assert code_of(lambda: meshes.open(mesh_id)) == (
         "mesh_damaged" if path.exists() else "mesh_not_found"
     )
-    store_mesh(tmp_path, mesh, "bob")
+    store_mesh(tmp_path, mesh)
 
     assert damage_of(meshes, mesh_id) == []
-    assert meshes.manifest(mesh_id)["owner"] == "bob"
 
 
 @pytest.mark.parametrize("content", [b"", b"[]", b"{}", b'{"id": "of another"}'])
@@ -169,7 +167,7 @@ def test_a_device_that_is_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     """A real one, which np.save would answer with an error that does not say so."""
     fill_disk(monkeypatch, "*.npy")
     with pytest.raises(OSError, match="No space left") as caught:
-        MeshStore(tmp_path).write_aside(gc.samples.plane(10_000), tmp_path / "mesh", None)
+        MeshStore(tmp_path).write_aside(gc.samples.plane(10_000), tmp_path / "mesh")
     assert caught.value.errno == errno.ENOSPC
 
 

@@ -108,7 +108,7 @@ def test_the_answer_of_a_job_stays_where_a_start_has_to_make_room(
         os.utime(tmp_path / "results" / "m" / f"{key}.json", (second, second))
 
     restarted = opened(tmp_path, 50, 0)
-    restarted.pin("m/job", None)
+    restarted.pin("m/job", "")
     restarted.make_room()
 
     assert find(restarted, "m/job") is not None
@@ -177,16 +177,16 @@ def test_the_memory_of_small_results_is_counted_whole(tmp_path: Path) -> None:
 
 def test_what_is_held_stays_until_it_is_released(results: ResultStore, tmp_path: Path) -> None:
     put(results, tmp_path, "m/a")
-    results.pin("m/a", None)
+    results.pin("m/a", "")
     other = results.add(write(tmp_path, "m/b", 61))
     with pytest.raises(ProblemError):
-        results.pin_within_quota("m/b", None)
+        results.pin_within_quota("m/b", "")
     results.release(other)
     results.forget_mesh("m")
 
     assert find(results, "m/a") is not None
     assert find(results, "m/b") is None
-    results.unpin("m/a", None)
+    results.unpin("m/a", "")
     put(results, tmp_path, "m/c", 61)
     assert find(results, "m/a") is None
 
@@ -224,7 +224,7 @@ def test_files_come_when_they_are_needed(roomy: ResultStore, tmp_path: Path) -> 
     taken = roomy.add(written)
 
     filed = anyio.run(roomy.with_files, taken)
-    roomy.pin("m/a", None)
+    roomy.pin("m/a", "")
     roomy.release(filed)
 
     assert roomy.body(filed).read_bytes() == b"x" * 40
@@ -287,29 +287,29 @@ def test_what_was_used_before_the_clock_was_set_back_goes_first(tmp_path: Path) 
 def test_room_is_reserved_among_pinned_results(tmp_path: Path) -> None:
     store = opened(tmp_path, 100, 0)
     store.add(write(tmp_path, "m/pinned", 40))
-    store.pin("m/pinned", None)
+    store.pin("m/pinned", "")
     store.add(write(tmp_path, "m/other", 30))
-    with store.reserving(None, 50):
+    with store.reserving("", 50):
         with pytest.raises(ProblemError):
-            store.pin_within_quota("m/other", None)
-        with pytest.raises(ProblemError) as refused, store.reserving(None, 11):
+            store.pin_within_quota("m/other", "")
+        with pytest.raises(ProblemError) as refused, store.reserving("", 11):
             pass
         problem = refused.value.problem
         assert (problem.code, problem.limit, problem.actual) == ("storage_full", 100, 101)
         assert problem.setting == "results_bytes"
-        with store.reserving(None, 0) as reserve:
+        with store.reserving("", 0) as reserve:
             reserve(6)
             reserve(4)
             with pytest.raises(ProblemError) as refused:
                 reserve(1)
             assert refused.value.problem.code == "storage_full"
-        with store.reserving(None, 10):
+        with store.reserving("", 10):
             pass
-    store.pin_within_quota("m/other", None)
+    store.pin_within_quota("m/other", "")
 
 
-def test_the_answers_of_one_owner_s_jobs_leave_room_for_others(tmp_path: Path) -> None:
-    """Both what is pinned and what is reserved count; a shared answer counts for each owner."""
+def test_the_answers_of_one_caller_s_jobs_leave_room_for_others(tmp_path: Path) -> None:
+    """Both what is pinned and what is reserved count; a shared answer counts for each caller."""
     store = opened(tmp_path, 100, 0, quota=50)
     for name in ("m/a", "m/b", "m/c"):
         store.add(write(tmp_path, name, 30))

@@ -37,18 +37,18 @@ class Machine:
         self.store = store
         self.folder = folder
 
-    async def write(self, mesh: gc.TriangleMesh = MESH, owner: str | None = None) -> WrittenMesh:
+    async def write(self, mesh: gc.TriangleMesh = MESH) -> WrittenMesh:
         """Write a mesh as a worker does, and send it where it is to be."""
         scratch = self.folder / TEMPORARY / uuid4().hex
         scratch.mkdir(parents=True)
-        written = MeshStore(self.folder).write_aside(mesh, scratch / "mesh", owner)
+        written = MeshStore(self.folder).write_aside(mesh, scratch / "mesh")
         if self.store.supply is not None:
             assert await self.store.supply.send_mesh(written)
         return written
 
-    async def put(self, mesh: gc.TriangleMesh = MESH, owner: str | None = None) -> str:
+    async def put(self, mesh: gc.TriangleMesh = MESH) -> str:
         """Put a new mesh into the store; return its id."""
-        written = await self.write(mesh, owner)
+        written = await self.write(mesh)
         await self.store.meshes.put(written)
         return written.mesh_id
 
@@ -127,15 +127,15 @@ async def code_of(call: Any) -> str:
 @pytest.mark.anyio
 async def test_a_mesh_of_one_machine_is_that_of_the_other(machines: Machines) -> None:
     one, two = machines
-    mesh_id = await one.put(owner="alice")
+    mesh_id = await one.put()
 
     for machine in machines:
         meshes = machine.store.meshes
         manifest = await meshes.manifest(mesh_id)
-        assert (manifest["id"], manifest["owner"]) == (mesh_id, "alice")
+        assert manifest["id"] == mesh_id
         record = await meshes.record(mesh_id)
         assert record is not None
-        assert (record.owner, record.is_pinned) == ("alice", False)
+        assert not record.is_pinned
         assert record.size > MESH.vertices.nbytes
         assert meshes.found() == {mesh_id: record}
         assert await meshes.is_intact(mesh_id)
@@ -212,12 +212,12 @@ async def test_a_removed_mesh_is_gone_for_all_but_those_who_have_it_open(
 @pytest.mark.anyio
 async def test_the_files_of_a_mesh_are_replaced(machines: Machines) -> None:
     one, two = machines
-    mesh_id = await one.put(owner="alice")
+    mesh_id = await one.put()
     before = await two.array(mesh_id, "faces")
     path = Path(await one.store.meshes.array_file(mesh_id, "faces"))
     path.write_bytes(path.read_bytes()[:-1] + b"x")  # of the store, or of the copy
 
-    written = await one.write(owner="bob")
+    written = await one.write()
     assert written.folder is not None, "it is not intact here"
     await one.store.meshes.put(written)
     for machine in machines:
@@ -226,7 +226,6 @@ async def test_the_files_of_a_mesh_are_replaced(machines: Machines) -> None:
         machine.store.meshes.distrust(mesh_id)
         assert await machine.store.meshes.is_intact(mesh_id)
         np.testing.assert_array_equal(await machine.array(mesh_id, "faces"), before)
-        assert (await machine.store.meshes.manifest(mesh_id))["owner"] == "alice"
         assert list(machine.store.meshes.found()) == [mesh_id]
 
 

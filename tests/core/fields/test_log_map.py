@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.errors import InvalidArgument, InvalidPoint
+from geodesic_core.errors import InvalidArgument, InvalidPoint, NoDirection, NoTangentPlane
 from geodesic_core.tolerances import ROUNDED_TURN
 from tests.support import zoo
 from tests.support.meshes import MESHES, mesh_of
@@ -243,10 +243,10 @@ def test_what_has_no_answer_is_refused(arguments, error, told):
 
 def test_a_point_on_an_edge_of_three_faces_has_no_plane():
     book = mesh_of(zoo.IRREGULAR["book_of_3"])
-    with pytest.raises(InvalidPoint, match="3 faces meet at an edge"):
+    with pytest.raises(NoTangentPlane, match="3 faces meet at an edge"):
         gc.log_map(book, book.point_on_edge(0, 1, 0.5))
     normal = np.cross(*(book.vertices[book.faces[0, [1, 2]]] - book.vertices[book.faces[0, 0]]))
-    with pytest.raises(InvalidArgument, match="no direction"):
+    with pytest.raises(NoDirection, match="no direction"):
         gc.log_map(book, gc.SurfacePoint.face(0, (0.2, 0.3, 0.5)), x_axis=normal)
 
 

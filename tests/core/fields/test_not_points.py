@@ -134,11 +134,6 @@ def test_barriers_by_a_mask(barriers: Any) -> None:
             ask()
 
 
-def test_several_positions_are_located_one_by_one() -> None:
-    with pytest.raises(gc.errors.InvalidPoint, match="of several positions, locate one after anot"):
-        MESH.locate(POSITIONS)
-
-
 @pytest.mark.parametrize("face", [0.5, True, "7", None])
 def test_a_face_that_is_no_index(face: Any) -> None:
     with pytest.raises(gc.errors.InvalidPoint, match=r"the point is in face .*; .* is an integer"):

@@ -64,7 +64,7 @@ def test_a_reader_of_another_library_reads_the_polyline(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("path", "message"),
     [
-        ("path.txt", r"must end in .obj, .ply, .csv, .json, .geojson or .npy"),
+        ("path.txt", r"must end in .obj, .ply, .vtp, .dxf, .csv, .json, .geojson, .npz or .npy"),
         ("path", r"path is 'path'; it must end in"),
         ("no/path.obj", "its folder does not exist"),
         (None, "path is None; it must be a string or a Path"),

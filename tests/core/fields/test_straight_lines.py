@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.errors import InvalidArgument, InvalidPoint
+from geodesic_core.errors import InvalidArgument, InvalidPoint, NoDirection, NoTangentPlane
 from geodesic_core.tolerances import NO_DIRECTION, THROUGH_VERTEX
 from tests.core.fields.test_log_map import apart, sources_of
 from tests.support import zoo
@@ -170,8 +170,19 @@ def test_no_direction_is_what_is_left_of_a_normal(share, is_refused):
     for start in (5, gc.SurfacePoint.face(4, (0.2, 0.3, 0.5))):
         vector = [share * NO_DIRECTION, 0.0, 1.0]
         if is_refused:
-            with pytest.raises(InvalidArgument, match="no direction"):
+            with pytest.raises(NoDirection, match="no direction"):
                 gc.trace(mesh, start, vector, 0.15)
         else:
             way = gc.trace(mesh, start, vector, 0.15).points
             np.testing.assert_allclose(way[-1] - way[0], [0.15, 0.0, 0.0], atol=1e-14)
+
+
+def test_errors_tell_which_of_many_lines_they_are_about():
+    mesh = mesh_of(zoo.IRREGULAR["book_of_3"])
+    good, bad = gc.SurfacePoint.face(0, (0.2, 0.3, 0.5)), mesh.point_on_edge(0, 1, 0.5)
+    with pytest.raises(NoTangentPlane) as refusal:
+        gc.trace(mesh, [good, good, bad], 0.1, 1.0)
+    assert refusal.value.index == 2
+    with pytest.raises(NoDirection) as refusal:
+        gc.trace(mesh, [good, good], [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]], 1.0)
+    assert refusal.value.index == 1

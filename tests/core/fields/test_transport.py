@@ -8,7 +8,6 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.errors import InvalidArgument, InvalidPoint
-from geodesic_core.fields.path import reversed_path
 from geodesic_core.kernels.mesh.half_edges import FANS
 from geodesic_core.mesh.transport import is_straight
 from geodesic_core.tolerances import STRAIGHT_THROUGH
@@ -102,7 +101,7 @@ def test_there_and_back_a_vector_is_the_same(case):
                 there = path.transport(ANGLE)
             except InvalidPoint:
                 continue
-            back = reversed_path(path).transport(there)
+            back = path.reversed().transport(there)
             assert apart(turns(mesh, source, back), turns(mesh, source, ANGLE)) <= ROUNDED
 
 

@@ -35,6 +35,7 @@ from geodesic_core.kernels.curves.crossings import (
     put_crossing,
 )
 from geodesic_core.kernels.curves.joining import join, put_crossings, room_for_ends
+from geodesic_core.kernels.curves.line_points import locate_lines
 from geodesic_core.kernels.curves.regions import put_disc
 from geodesic_core.kernels.mesh.half_edges import HEAD, LENGTH, OPPOSITE, TAIL
 from tests.conftest import WITHOUT_JIT
@@ -109,7 +110,7 @@ def lines_of_values(mesh: gc.TriangleMesh, values: np.ndarray, level: float):
             nodes.append((h, (level - low) / (high - low) * topology.geometry[h, LENGTH]))
     half_edges, positions = (np.array(column) for column in zip(*nodes, strict=True))
     crossings = number_crossings(links, row_of, faces, positions, half_edges.astype(np.int32))
-    points, count, chains, size = np.empty((1, 3)), 0, room_for_chains(1), 0
+    weights, chains, size = [], room_for_chains(1), 0
     for face in range(faces):
         around = crossings_around(topology.geometry, crossings, face, face)
         ends, starts = room_for_ends(2), room_for_ends(2)
@@ -117,26 +118,27 @@ def lines_of_values(mesh: gc.TriangleMesh, values: np.ndarray, level: float):
         paired = put_crossings(around, is_nearer, ends, starts, 0)
         for i, j in enumerate(join(ends.places[:paired], starts.places[:paired])):
             for node in (ends.ids[i], starts.ids[j]):
-                points, count = put_crossing(mesh.embedding, crossings, node, points, count)
+                weights.append(np.empty((1, 3)))
+                put_crossing(topology.geometry, crossings, node, face, weights[-1], 0)
             chains = with_chain(chains, size, 2, face, ends.ids[i], starts.ids[j])
             size += 1
-    first = np.arange(0, count + 1, 2)
-    found = Chains(points[:count], first, chains.nodes[:size], chains.faces[:size])
-    return link_crossing_chains(links, crossings.half_edges, found, 0.0)
+    first = np.arange(0, len(weights) + 1, 2)
+    found = Chains(np.concatenate(weights), first, chains.nodes[:size], chains.faces[:size])
+    lines = link_crossing_chains(topology, crossings.half_edges, found, 0.0)
+    return lines, locate_lines(mesh.embedding, mesh.faces, lines)[0].points + mesh.origin
 
 
 def test_crossings_alone_are_joined_to_the_level_set_of_any_values():
     """On a square: a straight line across, and a closed one around its middle."""
     mesh = gc.samples.plane(200)
-    positions = mesh.positions
-    lines = lines_of_values(mesh, positions[:, 0] + 0.3 * positions[:, 1], 0.42)
+    positions = mesh.positions + mesh.origin
+    lines, points = lines_of_values(mesh, positions[:, 0] + 0.3 * positions[:, 1], 0.42)
     assert lines.closed.tolist() == [0]
-    assert (lines.faces[:-1] >= 0).all()
-    assert lines.faces[-1] == -1
-    x, y, _ = lines.points.T
+    assert (lines.faces >= 0).all()
+    x, y, _ = points.T
     np.testing.assert_allclose(x + 0.3 * y, 0.42, atol=1e-15)
     assert np.ptp(y) == pytest.approx(1.0)
-    around = lines_of_values(mesh, np.hypot(*(positions[:, :2].T - 0.52)), 0.3)
+    around, points = lines_of_values(mesh, np.hypot(*(positions[:, :2].T - 0.52)), 0.3)
     assert around.closed.tolist() == [1]
-    assert around.first.tolist() == [0, len(around.points)]
-    assert np.hypot(*(around.points[:, :2].T - 0.52)) == pytest.approx(0.3, abs=0.02)
+    assert around.first.tolist() == [0, len(points)]
+    assert np.hypot(*(points[:, :2].T - 0.52)) == pytest.approx(0.3, abs=0.02)

@@ -5,7 +5,7 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL
-from geodesic_core.kernels.paths.locations import Locations, drop_repeats, locate_nodes
+from geodesic_core.kernels.mesh.locations import Locations, drop_repeats, locate_nodes
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 

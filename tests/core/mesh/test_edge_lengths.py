@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.errors import InvalidArgument, InvalidMesh
+from geodesic_core.errors import InvalidArgument, InvalidMesh, NotEmbedded
 from geodesic_core.kernels.mesh.half_edges import SIN_LEFT
 from geodesic_core.tolerances import ROUNDED_LENGTH
 from tests.core.fields.test_log_map import apart, sources_of
@@ -85,6 +85,23 @@ def test_on_a_flat_torus_all_is_as_in_the_plane_modulo_its_sides(columns, rows):
             assert gc.exact_distance(mesh, v, targets=[line.locations[-1]]).distance_at(
                 line.locations[-1]
             ) == pytest.approx(0.0, abs=1e-11)
+
+
+def test_lines_of_equal_distance_and_borders_are_locations():
+    """On a flat torus: circles, and the two lines halfway between two sources."""
+    mesh = flat_torus(20, 20, 1.0, 1.0)
+    other = 10  # half of the way around
+    field = gc.exact_distance(mesh, [0, other])
+    for line in field.isolines([0.2], chord_error=1e-7)[0]:
+        assert line.closed
+        assert line.length == pytest.approx(2.0 * np.pi * 0.2, rel=1e-5)
+        found = [field.distance_at(point) for point in line.locations[::40]]
+        np.testing.assert_allclose(found, 0.2, rtol=1e-9)
+    borders = field.borders()
+    assert sum(line.length for line in borders) == pytest.approx(2.0, rel=1e-9)
+    assert all(line.closed and line.sources == (0, 1) for line in borders)
+    away = gc.exact_distance(mesh, borders[0]).distances
+    assert away[[0, other]] == pytest.approx([0.25, 0.25], abs=SAME)
 
 
 @zoo.each(ALL)
@@ -226,13 +243,14 @@ def test_what_needs_space_says_so():
         mesh.tangent_frames,
         mesh.to_trimesh,
         mesh.to_pyvista,
-        lambda: field.isolines([0.2]),
-        field.borders,
+        lambda: field.isolines([0.2])[0][0].points,
+        lambda: field.isolines([0.2])[0][0].save("line.csv"),
         lambda: gc.shortest_path(mesh, 0, 7).to_pyvista(),
     ):
-        with pytest.raises(InvalidArgument, match="lengths alone") as refusal:
+        with pytest.raises(NotEmbedded, match="lengths alone") as refusal:
             ask()
         assert "\n" not in str(refusal.value)
+    assert mesh.report.bounds is None
     for ask in (
         lambda: field.gradient,
         lambda: gc.trace(mesh, 0, [1.0, 0.0, 0.0], 1.0),

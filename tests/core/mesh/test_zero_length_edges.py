@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
+from geodesic_core.kernels.mesh.locations import Locations
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 from tests.support.certificates import check_path
@@ -85,16 +86,17 @@ def check_on_the_surface(both, path, source, target, distance):
     without = {int(face): i for i, face in enumerate(both.place)}
     moved = gc.GeodesicPath(
         mesh=clean,
-        _points=path.points,
         faces=np.array([without[face] for face in path.faces.tolist()], np.int32),
+        closed=False,
         length=path.length,
+        located=Locations(
+            np.array([without.get(p.face_index, -1) for p in path.locations]),
+            np.array([p.barycentric for p in path.locations]),
+            np.array([-1 if p.vertex_index is None else p.vertex_index for p in path.locations]),
+            path.points,
+        ),
         error_bound=path.error_bound,
         steps=None,
-        _location_faces=np.array([without.get(p.face_index, -1) for p in path.locations]),
-        _location_weights=np.array([p.barycentric for p in path.locations]),
-        _location_vertices=np.array(
-            [-1 if p.vertex_index is None else p.vertex_index for p in path.locations]
-        ),
     )
     check_path(clean, moved, moved.locations[0], moved.locations[-1], distance)
 

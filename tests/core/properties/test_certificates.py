@@ -42,15 +42,21 @@ def test_another_length_is_refused(path):
         check(replace(path, length=path.length * (1 + 1e-9)), path.length)
 
 
+def moved(path, k):
+    """The path with a point that its location does not give."""
+    points = changed(path.points, k, path.points[k] + 1e-12)
+    return replace(path, located=path.located._replace(points=points))
+
+
 @pytest.mark.parametrize("k", [0, -1])
 def test_another_end_is_refused(path, k):
     with pytest.raises(AssertionError):
-        check(replace(path, _points=changed(path.points, k, path.points[k] + 1e-12)))
+        check(moved(path, k))
 
 
 def test_another_point_is_refused(path):
     with pytest.raises(AssertionError, match="weights give the point"):
-        check(replace(path, _points=changed(path.points, EDGE, path.points[EDGE] + 1e-12)))
+        check(moved(path, EDGE))
 
 
 @pytest.mark.parametrize(
@@ -63,13 +69,14 @@ def test_another_point_is_refused(path):
     ],
 )
 def test_other_weights_are_refused(path, weights, claim):
-    other = changed(path._location_weights, EDGE, weights)
+    other = changed(path.located.weights, EDGE, weights)
     with pytest.raises(AssertionError, match=claim):
-        check(replace(path, _location_weights=other))
+        check(replace(path, located=path.located._replace(weights=other)))
 
 
 def test_the_higher_face_at_an_edge_is_refused(path):
-    mesh, face, weights = path.mesh, path._location_faces[EDGE], path._location_weights[EDGE]
+    mesh, located = path.mesh, path.located
+    face, weights = located.faces[EDGE], located.weights[EDGE]
     edge = mesh.faces[face][weights > 0]
     (other,) = set(np.flatnonzero(np.isin(mesh.faces, edge).sum(axis=1) == 2)) - {face}
     there = [weights[mesh.faces[face] == v].sum() for v in mesh.faces[other]]
@@ -77,8 +84,10 @@ def test_the_higher_face_at_an_edge_is_refused(path):
         check(
             replace(
                 path,
-                _location_faces=changed(path._location_faces, EDGE, other),
-                _location_weights=changed(path._location_weights, EDGE, there),
+                located=located._replace(
+                    faces=changed(located.faces, EDGE, other),
+                    weights=changed(located.weights, EDGE, there),
+                ),
             )
         )
 

@@ -15,6 +15,9 @@ import type {
   ResolvedPoint,
   Step,
   StepsAnswer,
+  StraightLine,
+  TraceAnswer,
+  TraceRequest,
   Unreachable,
 } from "./types";
 
@@ -91,6 +94,43 @@ export async function askBorders(
   const path = `v1/meshes/${mesh}/borders`;
   const response = await answerOf(path, question, JSON_TYPE, onProgress, signal);
   return response.json() as Promise<BordersAnswer>;
+}
+
+export type TraceQuestion = Pick<TraceRequest, "starts" | "directions" | "lengths" | "barriers">;
+
+/** Return straight lines. */
+export async function askTrace(
+  mesh: string,
+  question: TraceQuestion,
+  signal: AbortSignal,
+): Promise<StraightLine[]> {
+  const response = await post(`v1/meshes/${mesh}/trace`, question, {}, signal);
+  return ((await response.json()) as TraceAnswer).lines;
+}
+
+/** Return the sum of the angles of the surface around a point, in radians. */
+export async function askTotalAngle(
+  mesh: string,
+  source: Point,
+  barriers: number[],
+  signal: AbortSignal,
+): Promise<number> {
+  const body = { source, barriers, max_distance: 0 };
+  const response = await post(`v1/meshes/${mesh}/log-map`, body, { Accept: NPY }, signal);
+  return jsonHeader(response, "Geodesic-Total-Angle");
+}
+
+/** Return the distances of some points, infinite where unreachable. */
+export async function askDistancesOf(
+  mesh: string,
+  question: Question,
+  targets: Point[],
+  signal: AbortSignal,
+): Promise<number[]> {
+  const body = { ...question, targets };
+  const response = await post(`v1/meshes/${mesh}/distances`, body, {}, signal);
+  const { distances } = (await response.json()) as DistancesAnswer;
+  return distances.map((distance) => distance ?? Infinity);
 }
 
 export interface RouteQuestion {

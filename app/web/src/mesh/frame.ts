@@ -1,7 +1,7 @@
 // The frame of a mesh: where its positions are drawn, and which way is up.
 export type Up = "y" | "z";
 
-type Triple = [number, number, number];
+export type Triple = [number, number, number];
 
 /** The transform of drawn positions: moved to the origin, scaled into the unit ball, turned upright. */
 export interface Frame {
@@ -27,6 +27,11 @@ export function frameOf(points: ArrayLike<number>, up: Up | null): Frame {
 export function drawnIn({ centre, radius, up }: Frame, position: readonly number[]): Triple {
   const [x, y, z] = position.map((value, i) => (value - centre[i]!) / radius) as Triple;
   return up === "y" ? [x, y, z] : [x, z, -y];
+}
+
+/** Return the vector from a position to another one. */
+export function differences(to: readonly number[], from: readonly number[]): Triple {
+  return to.map((x, axis) => x - (from[axis] ?? 0)) as Triple;
 }
 
 /** Return the axis along which a mesh lies if it is flat, or else stands on the wider foot; or y. */

@@ -4,6 +4,7 @@ import { MeshBVH } from "three-mesh-bvh";
 import { authorization } from "../api/http";
 import { ProblemError } from "../api/problemError";
 import type { MeshDocument, Point } from "../api/types";
+import { InputError } from "../inputError";
 import { drawnIn, type Frame, type Up } from "./frame";
 
 type Triple = [number, number, number];
@@ -104,12 +105,19 @@ export async function loadMesh(
   up: Up | null,
   signal: AbortSignal,
 ): Promise<LoadedMesh> {
+  const { vertices, faces } = document.arrays as Record<string, string>;
+  if (!vertices) {
+    throw new InputError(
+      "This mesh cannot be drawn",
+      "It is given by the lengths of its edges, and has no positions in space.",
+      "Upload it with vertices, or ask the service or the command line about it.",
+    );
+  }
   const worker = new LoaderWorker();
   signal.addEventListener("abort", () => worker.end());
-  const { vertices, faces } = document.arrays as Record<string, string>;
   const question = {
     kind: "mesh" as const,
-    vertices: vertices!,
+    vertices,
     faces: faces!,
     headers: authorization(),
     up,

@@ -23,7 +23,10 @@ import { PointField } from "./pointField";
 /** Positions that are this many edges from the surface, at most, are on it: they were rounded. */
 const FAR = 0.1;
 
-type Question = Pick<WrittenState, "sources" | "target" | "waypoints" | "barriers" | "maxDistance">;
+type Question = Pick<
+  WrittenState,
+  "sources" | "target" | "waypoints" | "walk" | "barriers" | "maxDistance"
+>;
 type Located<Q> = Omit<Q, "sources" | "target" | "waypoints"> &
   Pick<State, "sources" | "target" | "waypoints">;
 
@@ -45,7 +48,14 @@ export class Controls {
     });
     byId("points").addEventListener("change", () => this.readPoints());
     byId("clear").addEventListener("click", () => {
-      store.update({ sources: [], target: null, waypoints: [], barriers: [], maxDistance: null });
+      store.update({
+        sources: [],
+        target: null,
+        waypoints: [],
+        walk: null,
+        barriers: [],
+        maxDistance: null,
+      });
     });
     onChoice("methods", (method) => store.update({ method: method as Method }));
     onChoice("ups", (up) => store.update({ up: up as Up, view: null }));
@@ -61,6 +71,10 @@ export class Controls {
     });
     byId("lines").addEventListener("change", () => this.readLines(true));
     byId("lines-value").addEventListener("change", () => this.readLines(false));
+    byId("polar").addEventListener("change", () => {
+      const polar = byId("polar", HTMLInputElement).checked;
+      store.update({ polar, lines: store.state.lines ?? (polar ? INITIAL.lines : null) });
+    });
     byId("palette").addEventListener("change", () =>
       store.update({ palette: byId("palette", HTMLSelectElement).value as Palette }),
     );
@@ -92,7 +106,12 @@ export class Controls {
   /** Show ``state`` in all fields. */
   show(state: State): void {
     if (state.isReadable) this.showQuestion(state);
-    if (state.waypoints.length > 0 || state.barriers.length > 0 || state.maxDistance !== null)
+    if (
+      state.waypoints.length > 0 ||
+      state.walk ||
+      state.barriers.length > 0 ||
+      state.maxDistance !== null
+    )
       byId("more-points", HTMLDetailsElement).open = true;
     choose("methods", state.method);
     byId("epsilon").hidden = state.method !== "approximate";
@@ -109,6 +128,7 @@ export class Controls {
       "lines-value",
       lines === null ? "" : String("count" in lines ? lines.count : lines.spacing),
     );
+    byId("polar", HTMLInputElement).checked = state.polar;
     setValue("unit", state.unit);
     byId("palette", HTMLSelectElement).value = state.palette;
     setValue("range", state.range === null ? "" : String(state.range));
@@ -120,6 +140,7 @@ export class Controls {
     this.sources.show(state.sources);
     this.target.show(state.target ? [state.target] : []);
     this.waypoints.show(state.waypoints);
+    setValue("walk", state.walk?.join(", ") ?? "");
     setValue("barriers", writeRanges(state.barriers));
     setValue("max-distance", state.maxDistance === null ? "" : String(state.maxDistance));
   }
@@ -146,12 +167,16 @@ export class Controls {
   /** Read the question as it is written; throw where there is something else. */
   private read(): Question {
     const text = (id: string): string => byId(id, HTMLInputElement).value.trim();
-    const limits = { barriers: text("barriers"), max_distance: text("max-distance") };
-    const { barriers, maxDistance } = readState(new URLSearchParams(limits).toString());
+    const others = {
+      walk: text("walk"),
+      barriers: text("barriers"),
+      max_distance: text("max-distance"),
+    };
+    const { walk, barriers, maxDistance } = readState(new URLSearchParams(others).toString());
     const [sources, targets, waypoints] = [this.sources, this.target, this.waypoints].map((field) =>
       field.read(),
     ) as [WrittenPoint[], WrittenPoint[], WrittenPoint[]];
-    return { sources, target: targets[0] ?? null, waypoints, barriers, maxDistance };
+    return { sources, target: targets[0] ?? null, waypoints, walk, barriers, maxDistance };
   }
 
   private readLines(isOtherKind: boolean): void {

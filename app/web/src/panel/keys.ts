@@ -29,11 +29,13 @@ export function listenToKeys(
     Enter: (event) => inTheMiddle("source", event.shiftKey),
     t: () => inTheMiddle("target"),
     v: () => inTheMiddle("waypoint"),
+    g: () => inTheMiddle("walk"),
   };
   const anywhere: Record<string, () => void> = {
     Escape: () => status.cancel(),
     e: () => store.update({ method: NEXT[store.state.method] }),
     i: () => store.update({ lines: store.state.lines === null ? INITIAL.lines : null }),
+    p: () => byId("polar").click(),
     w: () => store.update({ wireframe: !store.state.wireframe }),
     f: () => byId("fit").click(),
   };

@@ -2,7 +2,7 @@
 import type { MeshDocument } from "../api/types";
 import { byId } from "../dom";
 
-type Topic = "points" | "distances" | "isolines" | "borders" | "path";
+type Topic = "points" | "distances" | "isolines" | "borders" | "rays" | "path" | "walk";
 
 export class Notes {
   private readonly told = new Map<Topic, readonly string[]>();

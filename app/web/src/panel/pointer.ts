@@ -1,13 +1,14 @@
 // Mouse and fingers on the mesh: a click sets a point, a drag from a point pulls the path along.
 import { Vector3 } from "three";
 import type { Point } from "../api/types";
+import { differences, type Triple } from "../mesh/frame";
 import { type FacePoint, positionOf } from "../mesh/picking";
 import { rounded } from "../state/point";
 import type { State, Store } from "../state/state";
 import type { SceneView } from "../view/sceneView";
 import { tell } from "./appearance";
 
-export type Tool = "source" | "target" | "waypoint" | "barrier";
+export type Tool = "source" | "target" | "waypoint" | "walk" | "barrier";
 
 /** Tolerances in pixels: how far a click may move, and how close to a point a drag must start. */
 const REACH = { still: 5, near: 16 };
@@ -24,7 +25,7 @@ type Place = { clientX: number; clientY: number };
 export class Pointer {
   private start: PointerEvent | null = null;
   /** The points that a drag may change, as they were before it. */
-  private before: Pick<State, "target" | "waypoints"> | null = null;
+  private before: Pick<State, "target" | "waypoints" | "walk"> | null = null;
   private drag: ((event: Place) => void) | null = null;
   private painted: Set<number> | null = null;
   private fingers = 0;
@@ -57,9 +58,9 @@ export class Pointer {
       this.abandon(); // two fingers move the mesh, even after one has begun a drag
       return;
     }
-    const { target, waypoints } = this.store.state;
+    const { target, waypoints, walk } = this.store.state;
     this.start = event;
-    this.before = { target, waypoints };
+    this.before = { target, waypoints, walk };
     this.drag = this.dragFrom(event);
     if (this.drag) {
       this.sceneView.stage.turnsByDrag = false;
@@ -76,6 +77,8 @@ export class Pointer {
       this.painted = painted;
       return (place) => this.paint(painted, place, event.shiftKey);
     }
+    if (this.tool() === "walk" && sources[0] && this.isNear(sources[0], event))
+      return this.moving((point) => this.walkTowards(point));
     const near = (point: Point | null): boolean => point !== null && this.isNear(point, event);
     if (sources.length > 0 && event.altKey)
       return this.moving((point) => this.store.update({ target: point }));
@@ -135,7 +138,18 @@ export class Pointer {
     const { sources, waypoints } = this.store.state;
     if (tool === "source") this.store.update({ sources: adds ? [...sources, point] : [point] });
     if (tool === "target") this.store.update({ target: point });
+    if (tool === "walk") this.walkTowards(point);
     if (tool === "waypoint") this.store.update({ waypoints: [...waypoints, point] });
+  }
+
+  /** Walk from the first source in the direction of a point, as far as it is away in space. */
+  private walkTowards(point: Point): void {
+    const { mesh } = this.sceneView;
+    const [source] = this.store.state.sources;
+    if (!mesh || !source) return;
+    const way = differences(positionOf(mesh, point), positionOf(mesh, source));
+    const walk = way.map((x) => Number(x.toPrecision(6))) as Triple;
+    if (Math.hypot(...walk) > 0) this.store.update({ walk });
   }
 
   private cancel(): void {

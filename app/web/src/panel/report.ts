@@ -44,7 +44,7 @@ function lineOf(words: string): HTMLLIElement {
 }
 
 function describe(mesh: MeshDocument, unit: string): string {
-  const [low, high] = mesh.bounds;
+  const [low, high] = mesh.bounds ?? [[], []]; // a mesh without positions is not drawn
   const size = high.map((x, i) => written(x - (low[i] ?? 0), 3)).join(" × ");
   const parts = mesh.components === 1 ? "one piece" : count(mesh.components, "piece");
   const rim =

@@ -1,7 +1,7 @@
 // The state as the page's address, and back: /?mesh=ID&source=v0&target=v99
 import type { Effort, Method } from "../api/types";
 import { InputError } from "../inputError";
-import type { Up } from "../mesh/frame";
+import type { Triple, Up } from "../mesh/frame";
 import { parsePoint, type WrittenPoint, writePoint } from "./point";
 import { INITIAL, type Lines, PALETTES, type Palette, type Shade, type State } from "./state";
 
@@ -24,6 +24,7 @@ export function writeState(state: State): string {
   for (const source of state.sources) query.append("source", writePoint(source));
   if (state.target) query.set("target", writePoint(state.target));
   for (const waypoint of state.waypoints) query.append("via", writePoint(waypoint));
+  if (state.walk) query.set("walk", state.walk.join(","));
   if (state.barriers.length > 0) query.set("barriers", writeRanges(state.barriers));
   if (state.method !== INITIAL.method) query.set("method", state.method);
   if (state.error !== INITIAL.error) query.set("error", String(state.error));
@@ -33,6 +34,7 @@ export function writeState(state: State): string {
   if (state.shade !== INITIAL.shade) query.set("shade", state.shade);
   if (writeLines(state.lines) !== writeLines(INITIAL.lines))
     query.set("lines", writeLines(state.lines));
+  if (state.polar) query.set("polar", "1");
   if (state.palette !== INITIAL.palette) query.set("palette", state.palette);
   if (state.range !== null) query.set("range", String(state.range));
   if (state.wireframe) query.set("wireframe", "1");
@@ -55,6 +57,7 @@ export function readState(search: string): WrittenState {
     sources: query.getAll("source").map(parsePoint),
     target: target === null ? null : parsePoint(target),
     waypoints: query.getAll("via").map(parsePoint),
+    walk: readWalk(query.get("walk") ?? ""),
     barriers: readRanges(query.get("barriers") ?? ""),
     method: oneOf<Method>(query.get("method"), ["exact", "approximate", "fast"]),
     error: positive(query.get("error")) ?? INITIAL.error,
@@ -64,6 +67,7 @@ export function readState(search: string): WrittenState {
     unit: query.get("unit")?.slice(0, LONGEST_UNIT) ?? "",
     shade: oneOf<Shade>(query.get("shade"), ["distance", "territories", "difference"]),
     lines: readLines(query.get("lines")),
+    polar: query.get("polar") === "1",
     palette: oneOf<Palette>(query.get("palette"), PALETTES),
     range: positive(query.get("range")),
     wireframe: query.get("wireframe") === "1",
@@ -85,6 +89,23 @@ function readLines(text: string | null): Lines {
   if (number !== null && kind === "count") return { count: Math.round(number) };
   if (number !== null && kind === "spacing") return { spacing: number };
   return INITIAL.lines;
+}
+
+/** Read a vector: x, y, z; nothing is none. */
+function readWalk(text: string): Triple | null {
+  if (!text.trim()) return null;
+  const numbers = text
+    .trim()
+    .split(/[\s,]+/)
+    .map(Number);
+  if (numbers.length !== 3 || !numbers.every(Number.isFinite)) {
+    throw new InputError(
+      "Not a vector",
+      `“${text}” is not a direction in space.`,
+      "Write its x, y and z: 0.5, 0, 0.2. Its length is that of the line.",
+    );
+  }
+  return numbers as Triple;
 }
 
 /** Write numbers as ranges, in order: 3,7,40-59. */

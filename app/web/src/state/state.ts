@@ -1,6 +1,6 @@
 // The state of the page: all that the user has chosen. Everything that is drawn follows from it.
 import type { Effort, Method, Point } from "../api/types";
-import type { Up } from "../mesh/frame";
+import type { Triple, Up } from "../mesh/frame";
 
 export type Shade = "distance" | "territories" | "difference";
 export const PALETTES = ["teal", "viridis", "magma", "cividis", "turbo"] as const;
@@ -12,6 +12,8 @@ export interface State {
   sources: Point[];
   target: Point | null;
   waypoints: Point[];
+  /** Direction and length of a straight line from the first source, in mesh units. */
+  walk: Triple | null;
   barriers: number[];
   method: Method;
   error: number;
@@ -23,6 +25,8 @@ export interface State {
   unit: string;
   shade: Shade;
   lines: Lines;
+  /** Whether rays of the log map cross the isolines. */
+  polar: boolean;
   palette: Palette;
   /** The distance of the last colour; null: the largest. */
   range: number | null;
@@ -38,6 +42,7 @@ export const INITIAL: State = {
   sources: [],
   target: null,
   waypoints: [],
+  walk: null,
   barriers: [],
   method: "exact",
   error: 0.01,
@@ -47,6 +52,7 @@ export const INITIAL: State = {
   unit: "",
   shade: "distance",
   lines: { count: 20 },
+  polar: false,
   palette: "teal",
   range: null,
   wireframe: false,
@@ -55,7 +61,15 @@ export const INITIAL: State = {
 };
 
 /** A change to any of these is another question: it can be read, unless the change says otherwise. */
-const QUESTION = ["mesh", "sources", "target", "waypoints", "barriers", "maxDistance"] as const;
+const QUESTION = [
+  "mesh",
+  "sources",
+  "target",
+  "waypoints",
+  "walk",
+  "barriers",
+  "maxDistance",
+] as const;
 
 type Listener = (state: State, before: State) => void;
 
@@ -86,6 +100,7 @@ export function withMesh(mesh: string, { lines }: State): Partial<State> {
     sources: [],
     target: null,
     waypoints: [],
+    walk: null,
     barriers: [],
     maxDistance: null,
     unit: "",

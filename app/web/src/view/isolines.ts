@@ -29,9 +29,12 @@ export class IsolineLayer {
     this.object.geometry.dispose();
     this.object.geometry = isShown
       ? ribbons(
-          lines.map(({ points, closed }) =>
-            (closed ? [...points, points[0]!] : points).map((point) => mesh.drawn(point)),
-          ),
+          lines.map((line) => {
+            const points = line.points ?? [];
+            return (line.closed ? [...points, points[0]!] : points).map((point) =>
+              mesh.drawn(point),
+            );
+          }),
         )
       : new BufferGeometry();
     this.stage.invalidate();

@@ -1,19 +1,21 @@
-// The path as a line with a casing; faint where the surface hides it.
+// A path as a line with a casing; faint where the surface hides it.
 import { BufferGeometry, Group, type Mesh } from "three";
 import { ribbonMesh, ribbons } from "./ribbon";
 import type { Stage } from "./scene";
 import type { Triple } from "./simplified";
 
-const COLOURS = { colour: 0xe6005c, casing: 0xffffff };
-
 export class RouteLine {
   private readonly object = new Group();
   private geometry = new BufferGeometry();
 
-  constructor(private readonly stage: Stage) {
+  constructor(
+    private readonly stage: Stage,
+    colour: number,
+  ) {
+    const colours = { colour, casing: 0xffffff };
     this.object.add(
-      ribbonMesh({ ...COLOURS, inner: 3, width: 3, opacity: 0.28, before: null, order: 3 }),
-      ribbonMesh({ ...COLOURS, inner: 4, width: 7, opacity: 1, before: 0.007, order: 4 }),
+      ribbonMesh({ ...colours, inner: 3, width: 3, opacity: 0.28, before: null, order: 3 }),
+      ribbonMesh({ ...colours, inner: 4, width: 7, opacity: 1, before: 0.007, order: 4 }),
     );
     this.object.visible = false;
     stage.addOverlay(this.object);

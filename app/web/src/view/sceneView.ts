@@ -21,6 +21,9 @@ const SOURCE: Rgb = [0.09, 0.13, 0.24];
 const TARGET: Rgb = [0.9, 0, 0.36];
 const WAYPOINT: Rgb = [0.96, 0.62, 0.04];
 const FAULT: Rgb = [0.85, 0.1, 0.1];
+const WALK: Rgb = [0.15, 0.39, 0.92];
+const ROUTE_LINE = 0xe6005c;
+const WALK_LINE = 0x2563eb;
 
 export class SceneView {
   readonly barriers: Patch;
@@ -33,7 +36,10 @@ export class SceneView {
   private readonly points: Markers;
   private readonly faultPoints: Markers;
   private readonly isolines: IsolineLayer;
+  private readonly rays: IsolineLayer;
   private readonly route: RouteLine;
+  private readonly walk: RouteLine;
+  private readonly walkEnd: Markers;
   private readonly territories: Territories;
 
   constructor(readonly stage: Stage) {
@@ -41,7 +47,10 @@ export class SceneView {
     this.region = new Patch(stage, 0xff8a1f, 0.6);
     this.faults = new Patch(stage, 0xd9121f, 0.9);
     this.isolines = new IsolineLayer(stage);
-    this.route = new RouteLine(stage);
+    this.rays = new IsolineLayer(stage);
+    this.route = new RouteLine(stage, ROUTE_LINE);
+    this.walk = new RouteLine(stage, WALK_LINE);
+    this.walkEnd = new Markers(stage);
     this.territories = new Territories(stage, this.paint);
     this.points = new Markers(stage);
     this.faultPoints = new Markers(stage);
@@ -85,7 +94,9 @@ export class SceneView {
     this.points.show([]);
     this.faultPoints.show([]);
     this.isolines.show(null, []);
+    this.rays.show(null, []);
     this.route.show([]);
+    this.showWalk([]);
     this.showBorders(new Int32Array(), []);
   }
 
@@ -135,6 +146,20 @@ export class SceneView {
   showRoute(outline: Outline | null): void {
     const points = this.mesh ? (outline?.points ?? []) : [];
     this.route.show(points.map((point) => this.mesh!.drawn(point)));
+  }
+
+  /** Show a straight line, and a point at its end. */
+  showWalk(points: readonly Triple[]): void {
+    const drawn = this.mesh ? points.map((point) => this.mesh!.drawn(point)) : [];
+    this.walk.show(drawn);
+    this.walkEnd.show(drawn.slice(-1).map((position) => ({ position, fill: WALK, size: 13 })));
+  }
+
+  showRays(rays: Pick<Line, "points">[]): void {
+    this.rays.show(
+      this.mesh,
+      rays.map(({ points }) => ({ points, closed: false })),
+    );
   }
 
   showIsolines(lines: Line[]): void {

@@ -77,6 +77,7 @@ function divided(mesh: LoadedMesh, nearest: Int32Array, borders: Border[]): Buff
 function piecesByFace(mesh: LoadedMesh, borders: Border[]): Map<number, Piece[]> {
   const found = new Map<number, Piece[]>();
   for (const { points, faces, sources } of borders) {
+    if (!points) continue; // of a mesh without positions, which is not drawn
     let last: Piece | null = null;
     faces.forEach((face, i) => {
       const next = points[(i + 1) % points.length]!;

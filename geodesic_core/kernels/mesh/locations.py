@@ -1,10 +1,13 @@
-"""Locations: the nodes of a traced path as points of the surface, in the caller's numbering."""
+"""Locations: the points of traced paths and lines on the surface, in the caller's numbering."""
 
 from typing import NamedTuple
+
+import numpy as np
 
 from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL, Embedding, Topology, next_around
+from geodesic_core.tolerances import WEIGHT
 
 
 class Locations(NamedTuple):
@@ -37,7 +40,7 @@ def locate_nodes(
         for k in range(3):
             locations.weights[i, k] = 0.0
         if v < 0:
-            locate_on_edge(embedding, faces, nodes[i], t, locations, i)
+            locate_on_edge(embedding, faces, nodes[i], 1.0 - t, t, locations, i)
         elif v < len(topology.total_angle):
             locate_vertex(embedding, faces, v, locations, i)
 
@@ -60,9 +63,10 @@ def locate_vertex(embedding: Embedding, faces: Ints, v: int, locations: Location
 
 @inlined
 def locate_on_edge(
-    embedding: Embedding, faces: Ints, h: int, t: float, locations: Locations, i: int
-) -> None:
-    """Fill row i of ``locations``, whose weights are 0, with the point at share t along h."""
+    embedding: Embedding, faces: Ints, h: int, tail: float, head: float, locations: Locations,
+    i: int,
+) -> None:  # fmt: skip
+    """Fill row i of ``locations``, whose weights are 0, with the point of h with these weights."""
     topology, positions = embedding
     links, outer_face = topology.links, topology.outer_face
     u, w = links[h, TAIL], links[h, HEAD]
@@ -71,10 +75,61 @@ def locate_on_edge(
         lowest = min(lowest, outer_face[g // 3])
         g = next_around(links, g)
     locations.faces[i], locations.vertices[i] = lowest, -1
-    locations.weights[i, corner_of(topology, faces, lowest, u)] = 1.0 - t
-    locations.weights[i, corner_of(topology, faces, lowest, w)] = t
+    locations.weights[i, corner_of(topology, faces, lowest, u)] = tail
+    locations.weights[i, corner_of(topology, faces, lowest, w)] = head
     for axis in range(3):
-        locations.points[i, axis] = (1.0 - t) * positions[u, axis] + t * positions[w, axis]
+        locations.points[i, axis] = tail * positions[u, axis] + head * positions[w, axis]
+
+
+@kernel
+def locate_points(
+    embedding: Embedding, faces: Ints, inner_faces: Longs, weights: Floats
+) -> Locations:
+    """Return the points of inner faces (N,) that have weights (N, 3) at inner corners."""
+    count = len(inner_faces)
+    located = Locations(
+        np.empty(count, np.int32),
+        np.empty((count, 3)),
+        np.empty(count, np.int64),
+        np.empty((count, 3)),
+    )
+    for i in range(count):
+        locate_in_face(embedding, faces, inner_faces[i], weights, i, located, i)
+    return located
+
+
+@kernel
+def locate_in_face(
+    embedding: Embedding, faces: Ints, face: int, weights: Floats, row: int, locations: Locations,
+    i: int,
+) -> None:  # fmt: skip
+    """Fill row i of ``locations`` with the point of an inner face that has weights in a row."""
+    topology, positions = embedding
+    links, corners, zero, corner = topology.links, 0, -1, -1
+    for k in range(3):
+        locations.weights[i, k] = 0.0
+        if weights[row, k] > WEIGHT:
+            corners, corner = corners + 1, k
+        else:
+            zero = k
+    if corners == 1:
+        locate_vertex(embedding, faces, links[3 * face + corner, TAIL], locations, i)
+    elif corners == 2:
+        k, following = (zero + 1) % 3, (zero + 2) % 3
+        tail, head = weights[row, k], weights[row, following]
+        if weights[row, zero] != 0.0:
+            tail = 1.0 - head
+        locate_on_edge(embedding, faces, 3 * face + k, tail, head, locations, i)
+    else:
+        outer = topology.outer_face[face]
+        locations.faces[i], locations.vertices[i] = outer, -1
+        for axis in range(3):
+            locations.points[i, axis] = 0.0
+        for k in range(3):
+            v, weight = links[3 * face + k, TAIL], weights[row, k]
+            locations.weights[i, corner_of(topology, faces, outer, v)] = weight
+            for axis in range(3):
+                locations.points[i, axis] += weight * positions[v, axis]
 
 
 @kernel

@@ -1,0 +1,82 @@
+// The straight line from the first source in a direction, which follows the pointer.
+import { LatestOnly } from "../api/latestOnly";
+import { askTrace, type TraceQuestion } from "../api/queries";
+import type { StraightLine } from "../api/types";
+import { written } from "../dom";
+import type { Notes } from "../panel/notes";
+import { type State, unitOf } from "../state/state";
+import type { Status } from "../status";
+import type { SceneView } from "../view/sceneView";
+
+type WalkRequest = TraceQuestion & { mesh: string };
+
+const ENDS: Record<StraightLine["stopped"], string> = {
+  length: "as long as it was drawn",
+  boundary: "up to the boundary",
+  barrier: "up to a barrier",
+  vertex: "up to a vertex",
+  non_manifold: "up to where more than two faces meet",
+};
+
+export class Walks {
+  private requested = "";
+  private request: WalkRequest | null = null;
+  private line: StraightLine | null = null;
+  private unit = "";
+  private readonly latestOnly: LatestOnly<WalkRequest>;
+
+  constructor(
+    status: Status,
+    private readonly sceneView: SceneView,
+    private readonly notes: Notes,
+  ) {
+    this.latestOnly = new LatestOnly<WalkRequest>(
+      (request, stop) =>
+        status.during("busy", "Walking straight…", stop, () => this.answer(request, stop.signal)),
+      (error) => {
+        this.requested = "";
+        this.show(null);
+        status.fail(error);
+      },
+    );
+  }
+
+  /** Request the line that ``state`` asks for. */
+  follow(state: State): void {
+    const { mesh, sources, walk, barriers, isReadable } = state;
+    this.unit = unitOf(state);
+    const [start] = sources;
+    const requested = JSON.stringify([mesh, start, walk, barriers, isReadable]);
+    if (requested === this.requested) return;
+    this.requested = requested;
+    this.request =
+      mesh && start && walk && isReadable
+        ? { mesh, starts: [start], directions: [walk], lengths: [Math.hypot(...walk)], barriers }
+        : null;
+    if (this.request) {
+      this.latestOnly.ask(this.request);
+    } else {
+      this.latestOnly.cancel();
+      this.show(null);
+    }
+  }
+
+  /** Draw the line that was found; a mesh that was just loaded shows none yet. */
+  draw(): void {
+    this.sceneView.showWalk(this.line?.points ?? []);
+  }
+
+  private async answer(request: WalkRequest, signal: AbortSignal): Promise<void> {
+    const { mesh, ...question } = request;
+    const [line] = await askTrace(mesh, question, signal);
+    if (this.request?.mesh === mesh) this.show(line ?? null);
+  }
+
+  private show(line: StraightLine | null): void {
+    this.line = line;
+    this.draw();
+    const words =
+      line && `Straight on: ${written(line.length, 6)} ${this.unit}, ${ENDS[line.stopped]}.`;
+    this.notes.tell("walk", words ? [words] : []);
+  }
+}

@@ -1,0 +1,1 @@
+"""Meshes cut along curves."""

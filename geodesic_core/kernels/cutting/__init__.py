@@ -1,0 +1,1 @@
+"""Cutting: triangulations of single faces in which given segments are edges."""
