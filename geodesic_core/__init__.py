@@ -39,6 +39,7 @@ from geodesic_core.mesh.surface_curve import SurfaceCurve
 from geodesic_core.mesh.surface_point import Curve, Source, SurfacePoint
 from geodesic_core.mesh.tangent_frames import TangentFrames
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.sampling.farthest_points import FarthestPoints
 from geodesic_core.search.nearest import Nearest
 from geodesic_core.solvers import (
     Solver,
@@ -47,6 +48,7 @@ from geodesic_core.solvers import (
     distance_matrix,
     error_bound,
     exact_distance,
+    farthest_points,
     fast_distance,
     kernel_digest,
     log_map,
@@ -64,6 +66,7 @@ __all__ = [
     "CutMesh",
     "DistanceField",
     "ErrorBound",
+    "FarthestPoints",
     "GeodesicError",
     "GeodesicPath",
     "LogMap",
@@ -92,6 +95,7 @@ __all__ = [
     "error_bound",
     "errors",
     "exact_distance",
+    "farthest_points",
     "fast_distance",
     "kernel_digest",
     "load_field",

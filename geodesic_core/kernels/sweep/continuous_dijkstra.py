@@ -1,7 +1,5 @@
 """The continuous-Dijkstra loop (section 3.4), resumable in slices."""
 
-import math
-
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.kernels.front.bounds import Bounds
 from geodesic_core.kernels.front.counters import (
@@ -21,6 +19,7 @@ from geodesic_core.kernels.front.state import (
     IN_RING,
     LIST,
     MARKS,
+    SEEN,
     SETTLED,
     SIZE,
     View,
@@ -135,7 +134,7 @@ def settle_nearest(wave: View) -> Outcome:
         across = mesh.links[ROW * h + OUT_RIGHT]
         if across >= 0 and wave.pool.lists[LIST * across + SIZE] > 0:
             far = mesh.links[ROW * across + APEX]
-            if vertices.status[far] != FAR:
+            if vertices.status[far] >= FRONT:
                 queue_list(wave, across)
         elif across == IRREGULAR:
             queue_lists_beyond(wave, following(h))
@@ -162,7 +161,7 @@ def queue_lists_beyond(wave: View, g: int) -> None:
     mesh = wave.mesh
     h = mesh.links[ROW * g + AROUND] >> 1
     while h != g:
-        if wave.vertices.status[mesh.links[ROW * h + APEX]] != FAR:
+        if wave.vertices.status[mesh.links[ROW * h + APEX]] >= FRONT:
             queue_list(wave, h)
         h = mesh.links[ROW * h + AROUND] >> 1
 
@@ -185,8 +184,8 @@ def mark_front(wave: View, v: int) -> None:
     """Mark v as a neighbour of a settled vertex. Modifies its status."""
     vertices = wave.vertices
     if vertices.status[v] == FAR:
-        if vertices.distance[v] == math.inf:
-            touch(wave, v)
+        touch(wave, v)
+    if vertices.status[v] == SEEN:
         vertices.status[v] = FRONT
 
 
