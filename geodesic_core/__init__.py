@@ -19,6 +19,7 @@ from geodesic_core.control import Control
 from geodesic_core.cutting.cut_mesh import CutMesh
 from geodesic_core.errors import GeodesicError
 from geodesic_core.fields.borders import Border
+from geodesic_core.fields.cells import Cells
 from geodesic_core.fields.distance_field import DistanceField
 from geodesic_core.fields.isolines import resolve_chord_error, spaced_levels
 from geodesic_core.fields.log_map import LogMap, Polar
@@ -40,6 +41,8 @@ from geodesic_core.mesh.surface_point import Curve, Source, SurfacePoint
 from geodesic_core.mesh.tangent_frames import TangentFrames
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.sampling.farthest_points import FarthestPoints
+from geodesic_core.sampling.mean_point import MeanPoint
+from geodesic_core.sampling.relaxation import RelaxedPoints
 from geodesic_core.search.nearest import Nearest
 from geodesic_core.solvers import (
     Solver,
@@ -52,7 +55,9 @@ from geodesic_core.solvers import (
     fast_distance,
     kernel_digest,
     log_map,
+    mean_point,
     nearest,
+    relax_points,
     shortest_path,
     trace,
 )
@@ -61,6 +66,7 @@ from geodesic_core.tolerances import WEIGHT_ERROR
 __all__ = [
     "WEIGHT_ERROR",
     "Border",
+    "Cells",
     "Control",
     "Curve",
     "CutMesh",
@@ -72,9 +78,11 @@ __all__ = [
     "LogMap",
     "MatrixFile",
     "MatrixParts",
+    "MeanPoint",
     "MeshReport",
     "Nearest",
     "Polar",
+    "RelaxedPoints",
     "Retain",
     "Sample",
     "ScalarField",
@@ -103,7 +111,9 @@ __all__ = [
     "load_label_vertices",
     "load_mesh",
     "log_map",
+    "mean_point",
     "nearest",
+    "relax_points",
     "resolve_chord_error",
     "samples",
     "share_a_face",

@@ -42,11 +42,20 @@ from geodesic_core.mesh.surface_curve import Sources, SurfaceCurve, length_of
 from geodesic_core.mesh.surface_point import Curve, Point, Points, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.sampling.farthest_points import FarthestPoints, spread_points
+from geodesic_core.sampling.mean_point import MeanPoint, find_mean
+from geodesic_core.sampling.relaxation import RelaxedPoints, relaxed_points
 from geodesic_core.search.nearest import Nearest, find_nearest
 from geodesic_core.search.path_search import PathSearch
 from geodesic_core.search.workspace import Workspace
 from geodesic_core.tolerances import AT_LIMIT
-from geodesic_core.validation import as_limit, check_choice, is_index, is_number, unboxed
+from geodesic_core.validation import (
+    as_limit,
+    as_nonnegative,
+    check_choice,
+    is_index,
+    is_number,
+    unboxed,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -870,6 +879,145 @@ def farthest_points(
     return spread_points(question, most, least, control)
 
 
+def relax_points(
+    mesh: MeshLike | Solver,
+    points: Points,
+    iterations: int = 20,
+    density: ArrayLike | None = None,
+    barriers: Iterable[int] = (),
+    *,
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> RelaxedPoints:
+    """Return points spread evenly, by Lloyd's method: each in the middle of its own cell.
+
+    In each iteration every point moves straight to the centroid of what is nearest to it, in its
+    log map; by less, where the sum of squared distances would rise.
+
+    Parameters
+    ----------
+    mesh
+        The surface: a `TriangleMesh`, anything else that `as_mesh` takes, or a `Solver`.
+    points
+        Where they begin: one or more vertex indices or `SurfacePoint`; `farthest_points` finds good
+        ones.
+    iterations
+        How often they move, at most; fewer if they converge.
+    density
+        (V,) numbers, 0 or more, at the vertices: where it is high, points come to lie closer. None
+        for the same everywhere.
+    barriers
+        As in `exact_distance`.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
+
+    Returns
+    -------
+    RelaxedPoints
+        The points, and the cost after each iteration, which never rises.
+
+    Raises
+    ------
+    NoTangentPlane
+        A point has none, as in `log_map`.
+    InvalidPoint
+        A point is not on the mesh.
+    InvalidArgument
+        Another argument is out of its domain.
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `exact_distance`.
+
+    Notes
+    -----
+    A sweep for each iteration, and one more for each time that a move is halved. Distances are
+    exact. The surface counts at its vertices, by a third of the area of their faces: so cells
+    should have many vertices.
+
+    Examples
+    --------
+    >>> mesh = gc.samples.plane(2000)  # the unit square
+    >>> relaxed = gc.relax_points(mesh, gc.farthest_points(mesh, 5).points)
+    >>> bool(relaxed.costs[-1] < relaxed.costs[0])
+    True
+    """
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    if not (is_index(iterations) and iterations >= 0):
+        raise InvalidArgument(f"iterations is {iterations!r}; it must be a whole number, 0 or more")
+    surface, control = _surface_of(mesh, barriers, control)
+    starts = tuple(as_points(surface, points, "point", control))
+    mass = as_nonnegative("density", 1.0 if density is None else density, len(surface.vertices))
+    return relaxed_points(surface, starts, iterations, mass, control)
+
+
+def mean_point(
+    mesh: MeshLike | Solver,
+    points: Points,
+    weights: ArrayLike | None = None,
+    barriers: Iterable[int] = (),
+    *,
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> MeanPoint:
+    """Return the mean of points on a surface: where squared distances from them sum to the least.
+
+    It is also called their Karcher or Fréchet mean. The search begins at the best vertex, so that
+    it seldom ends in a place that is only better than all around it.
+
+    Parameters
+    ----------
+    mesh
+        The surface: a `TriangleMesh`, anything else that `as_mesh` takes, or a `Solver`.
+    points
+        One or more vertex indices or `SurfacePoint`.
+    weights
+        (N,) numbers, 0 or more, of which one is above 0. None for the same for all.
+    barriers
+        As in `exact_distance`.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
+
+    Returns
+    -------
+    MeanPoint
+        The point, the variance, and whether the search came to its end.
+
+    Raises
+    ------
+    NoPath
+        The points are in different parts of the surface.
+    NoTangentPlane
+        The search meets a point that has none, as in `log_map`.
+    InvalidPoint
+        A point is not on the mesh.
+    InvalidArgument
+        The weights are out of their domain.
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `exact_distance`.
+
+    Notes
+    -----
+    One sweep for each point, and one for each place that the search tries.
+
+    Examples
+    --------
+    >>> mesh = gc.samples.plane(2)  # the unit square
+    >>> mean = gc.mean_point(mesh, [0, 3], weights=[3.0, 1.0])
+    >>> mesh.position(mean.point).round(6).tolist()
+    [0.25, 0.25, 0.0]
+    """
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    surface, control = _surface_of(mesh, barriers, control)
+    places = tuple(as_points(surface, points, "point", control))
+    shares = as_nonnegative("weights", 1.0 if weights is None else weights, len(places))
+    if not shares.sum() > 0.0:
+        raise InvalidArgument("weights are all 0: one must be above 0")
+    return find_mean(surface, places, shares / shares.sum(), control)
+
+
 class Solver:
     """Solvers of one mesh that reuse memory and landmarks from call to call.
 
@@ -923,6 +1071,8 @@ class Solver:
     trace = trace
     cut = cut
     farthest_points = farthest_points
+    relax_points = relax_points
+    mean_point = mean_point
 
 
 def _surface_of(

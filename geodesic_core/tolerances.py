@@ -405,3 +405,9 @@ MOST_AT_LARGE = 4
 LAST_BUCKET = 1e18
 """Number of the bucket that all windows share whose distances are beyond it: integers end at 9e18.
 """
+
+SMALLEST_MOVE = 1e-9
+"""Share of the surface's extent: points that would move by less have reached their place.
+
+What moves by the mean of distances cannot be placed better than these are squared and summed.
+"""
