@@ -152,9 +152,10 @@ def cells_of(
     field: "DistanceField",
     borders: list[Border],
     limits: list[SurfaceCurve],
+    max_distance: float,
     control: Control,
 ) -> Cells:
-    """Return the cells of a field between borders, and within ``limits``.
+    """Return the cells of a field between borders, and within the isolines of ``max_distance``.
 
     Raises
     ------
@@ -165,10 +166,10 @@ def cells_of(
     curves = [*borders, *limits]
     lines = [as_line(mesh, curve, f"border {i}", control) for i, curve in enumerate(curves)]
     cut = cut_along(mesh, lines or [NO_LINE], control, separate=True)
-    return Cells(field, tuple(borders), cut, _cell_of(field, cut, control))
+    return Cells(field, tuple(borders), cut, _cell_of(field, cut, max_distance, control))
 
 
-def _cell_of(field: "DistanceField", cut: CutMesh, control: Control) -> Ints:
+def _cell_of(field: "DistanceField", cut: CutMesh, max_distance: float, control: Control) -> Ints:
     """Return the source of each face of a mesh that was cut apart along borders.
 
     No border crosses a part: all of it belongs to the source of any vertex off all borders, or of
@@ -179,13 +180,15 @@ def _cell_of(field: "DistanceField", cut: CutMesh, control: Control) -> Ints:
     on_border[cut.copy_of[cut.curve_edges]] = True
     vertices = cut.copy_of[cut.faces]
     tells = ~on_border[vertices] & (vertices < len(mesh.vertices))
-    told, of_part = field.nearest_source[vertices[tells]], np.repeat(parts, 3)[tells.reshape(-1)]
+    nearest = np.where(field.distances <= max_distance, field.nearest_source, -1)
+    told, of_part = nearest[vertices[tells]], np.repeat(parts, 3)[tells.reshape(-1)]
     source_of = np.full(int(parts.max()) + 1, _UNKNOWN, np.int32)
     source_of[of_part] = told
     for part in control.watched(np.flatnonzero(source_of == _UNKNOWN)):
         faces = np.flatnonzero(parts == part)
         largest = int(faces[cut.mesh.face_areas[faces].argmax()])
         middle = cut.to_old(SurfacePoint.face(largest, (1 / 3, 1 / 3, 1 / 3)))
-        source_of[part] = field.nearest_source_at(middle)
+        is_within = field.distance_at(middle) <= max_distance
+        source_of[part] = field.nearest_source_at(middle) if is_within else -1
     found: Ints = source_of[parts]
     return found

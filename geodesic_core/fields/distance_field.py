@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
@@ -49,6 +49,9 @@ from geodesic_core.plotting import Camera
 from geodesic_core.reprs import as_table
 from geodesic_core.tolerances import CUT_OFF
 from geodesic_core.validation import as_angle, check_choice
+
+_BEYOND_LIMIT = 10.0
+"""Chord errors by which borders of cells go beyond ``max_distance``"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -868,20 +871,21 @@ class DistanceField:
         [0.5, 0.5]
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
-        error = resolve_chord_error(self.mesh, chord_error)
-        if self._sweep.exact is not self._sweep:
-            exact = solve(self._sweep.exact, "distances", control.for_part(0, 2))
-            return exact._cells(error, control.for_part(1, 2))
-        return self._cells(error, control)
-
-    def _cells(self, error: float, control: Control) -> Cells:
-        borders = self._borders(error, control.for_part(0, 2))
+        error, question = resolve_chord_error(self.mesh, chord_error), self._sweep.question
+        limit = question.max_distance
+        # Borders go beyond the line of the limit, whose chords may leave out where two arcs meet.
+        question = replace(question, max_distance=limit + _BEYOND_LIMIT * error)
+        field = self
+        if self._sweep.exact is not self._sweep or math.isfinite(limit):
+            field = solve(ExactSweep(question), "distances", control.for_part(0, 2))
+            control = control.for_part(1, 2)
+        borders = field._borders(error, control.for_part(0, 2))
         control = control.for_part(1, 2)
         limits: list[SurfaceCurve] = []
-        if math.isfinite(self.max_distance):
-            (limits,) = self._isolines([self.max_distance], error, control.for_part(0, 2))
+        if math.isfinite(limit):
+            (limits,) = field._isolines([limit], error, control.for_part(0, 2))
             control = control.for_part(1, 2)
-        return cells_of(self, borders, limits, control)
+        return cells_of(field, borders, limits, limit, control)
 
     def _windows_at(self, levels: Sequence[float], control: Control) -> tuple[Floats, FaceWindows]:
         """Sweep for distances by node, and the windows of all faces that some levels may pass."""
