@@ -122,12 +122,9 @@ def add_source(
         As in `sweep_nodes`.
     """
     further_sources.add_source(mesh.topology, wave, bounds, vertex, index)
-    waiting = True
-    while waiting:
-        wave, outcome = run_sweep(mesh, wave, bounds, control, lambda _: 0.0)
-        if outcome == Outcome.RUNAWAY:
-            raise _endless(mesh.topology, wave)
-        waiting = further_sources.queue_waiting(mesh.topology, wave, bounds) > 0
+    wave, outcome = run_sweep(mesh, wave, bounds, control, lambda _: 0.0)
+    if outcome == Outcome.RUNAWAY:
+        raise _endless(mesh.topology, wave)
     return wave
 
 

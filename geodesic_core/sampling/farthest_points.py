@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from geodesic_core.arrays import Floats, Ints, Longs
+from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument
 from geodesic_core.fields.question import Question
@@ -76,14 +76,14 @@ def spread_points(
     """
     mesh, sweep = question.mesh, ExactSweep(question)
     found = [line[0] for line in question.polylines]
-    vertices = _on_surface(mesh)
-    nodes = mesh.topology.inner_vertex[vertices]
+    topology = mesh.topology
+    in_no_face = topology.first_corner[1:] == topology.first_corner[:-1]
     silent = replace(control, progress=None)
     wave, bounds, radii = sweep.run(silent), sweep.bounds, list[float]()
     while True:
-        distances = wave.vertices.distance[nodes]
-        farthest = int(distances.argmax())
-        radii.append(float(distances[farthest]))
+        distances = wave.vertices.distance[: len(mesh.vertices)]
+        distances[in_no_face] = -1.0
+        radii.append(float(distances.max()))
         if len(found) >= count or radii[-1] <= radius:
             break
         if radii[-1] == 0.0:
@@ -94,16 +94,13 @@ def spread_points(
         control.checkpoint(max(len(found) / count, (max(radius, 0.0) / radii[-1]) ** 2))
         # No path that is longer improves a vertex.
         bounds = bounds._replace(max_distance=radii[-1])
-        wave = add_source(mesh, wave, int(nodes[farthest]), len(found), bounds, silent)
-        found.append(mesh.point(int(vertices[farthest])))
+        vertex = int(topology.outer_vertex[np.flatnonzero(distances == radii[-1])].min())
+        node = int(topology.inner_vertex[vertex])
+        wave = add_source(mesh, wave, node, len(found), bounds, silent)
+        found.append(mesh.point(vertex))
     if control.progress is not None:
         control.progress(1.0)
-    distances, inner = wave.vertices.distance, mesh.topology.inner_vertex
+    wave.vertices.distance[: len(mesh.vertices)][in_no_face] = np.inf
+    distances, inner = wave.vertices.distance, topology.inner_vertex
     nearest = nearest_sources(distances, wave.vertices.winner_ints, wave.vertices.source_index)
     return FarthestPoints(mesh, tuple(found), np.array(radii), distances[inner], nearest[inner])
-
-
-def _on_surface(mesh: TriangleMesh) -> Longs:
-    """Return the vertices that a face has."""
-    first = mesh.topology.first_corner
-    return np.flatnonzero((first[1:] > first[:-1])[mesh.topology.inner_vertex])

@@ -12,6 +12,7 @@ PARTS = [
     "compilation",
     "solvers",
     "matrices",
+    "sampling",
     "cutting",
     "search",
     "fields",

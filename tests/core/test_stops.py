@@ -63,6 +63,9 @@ SWEEPS = {
 SWEEPS |= {
     "log map": lambda m, **watch: gc.log_map(m, INSIDE, x_axis=7, **watch),
     "cut": lambda m, **watch: gc.cut(m, crossing_chords(), **watch),
+    "farthest points": lambda m, **watch: gc.farthest_points(m, 60, **watch),
+    "relaxed": lambda m, **watch: gc.relax_points(m, [INSIDE, 5, 900], 3, **watch),
+    "mean": lambda m, **watch: gc.mean_point(m, [INSIDE, 5, 900], **watch),
     "lines": lambda m, **watch: gc.trace(m, MANY, np.arange(10.0), 300.0, **watch),
 }
 SEARCHES = {
@@ -90,6 +93,7 @@ METHODS = {
     "isolines": lambda field, **watch: field.isolines(field.levels(3), **watch),
     "each_isoline": lambda field, **watch: list(field.each_isoline(field.levels(3), **watch)),
     "borders": lambda field, **watch: field.borders(**watch),
+    "cells": lambda field, **watch: field.cells(**watch),
     "path_to a vertex": lambda field, **watch: field.path_to(300, **watch),
     "path_to": lambda field, **watch: field.path_to(INSIDE, **watch),
     "distance_at": lambda field, **watch: field.distance_at(INSIDE, **watch),

@@ -3,6 +3,7 @@
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.kernels.front.bounds import Bounds
 from geodesic_core.kernels.front.counters import (
+    ADDED,
     HEAP_SIZE,
     RING_HEAD,
     RING_SIZE,
@@ -45,6 +46,7 @@ from geodesic_core.kernels.mesh.half_edges import (
 )
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.sweep.delivery import DELIVERY
+from geodesic_core.kernels.sweep.further_sources import queue_waiting
 from geodesic_core.kernels.sweep.propagation import propagate_list
 from geodesic_core.kernels.sweep.pseudosources import emit_pseudosource, is_pseudosource
 
@@ -91,13 +93,22 @@ def advance(topology: Topology, wavefront: Wavefront, bounds: Bounds, budget: in
     wave = view_of(topology, wavefront, bounds)
     wave.counters[WORK] = 0
     outcome = drain(wave, budget)
-    while outcome == Outcome.FINISHED and wave.counters[HEAP_SIZE] > 0:
+    while outcome == Outcome.FINISHED and is_unfinished(wave):
         if wave.counters[WORK] >= budget:
             return Outcome.RUNNING
-        outcome = settle_nearest(wave)
+        if wave.counters[HEAP_SIZE] > 0:
+            outcome = settle_nearest(wave)
         if outcome == Outcome.FINISHED:
             outcome = drain(wave, budget)
     return outcome
+
+
+@inlined
+def is_unfinished(wave: View) -> bool:
+    """Whether vertices are to be settled, or else lists propagated that still waited."""
+    if wave.counters[HEAP_SIZE] > 0:
+        return True
+    return wave.counters[ADDED] > 0 and queue_waiting(wave) > 0
 
 
 @kernel

@@ -8,6 +8,7 @@ it does: there no end of the edge is settled, and the list waits until all else 
 
 from geodesic_core.kernels.front.bounds import Bounds
 from geodesic_core.kernels.front.counters import (
+    ADDED,
     RING_SIZE,
     SETTLED_VERTICES,
     TOUCHED,
@@ -28,6 +29,7 @@ def add_source(
     for i in range(wave.counters[TOUCHED]):
         reset_around(wave, wave.vertices.touched[i])
     wave.counters[TOUCHED] = wave.counters[SETTLED_VERTICES] = 0
+    wave.counters[ADDED] = 1
     wave.vertices.source_index[vertex] = source_index
     start_at(wave, vertex, 0.0)
 
@@ -47,16 +49,16 @@ def reset_around(wave: View, v: int) -> None:
 
 
 @kernel
-def queue_waiting(topology: Topology, wavefront: Wavefront, bounds: Bounds) -> int:
+def queue_waiting(wave: View) -> int:
     """Queue the lists that still wait for an end of their edge; return how many there are.
 
     Windows lie only in faces of touched vertices. Modifies the ring.
     """
-    wave = view_of(topology, wavefront, bounds)
+    mesh = wave.mesh
     for i in range(wave.counters[TOUCHED]):
         v = wave.vertices.touched[i]
-        for c in range(topology.first_corner[v], topology.first_corner[v + 1]):
-            face = topology.corners[c] // 3
+        for c in range(mesh.first_corner[v], mesh.first_corner[v + 1]):
+            face = mesh.corners[c] // 3
             for h in range(3 * face, 3 * face + 3):
                 queue_list(wave, h)
     return int(wave.counters[RING_SIZE])
