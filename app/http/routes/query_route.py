@@ -145,10 +145,14 @@ async def answer(
     answered = await while_connected(request, answering)
     if isinstance(answered, Job):
         return accepted_response(answered, prefix_of(request.scope))
-    result, seconds = answered
+    result, seconds, mesh = answered
     note_work(request, mesh_id, seconds)
+    status = 200
+    if mesh is not None:
+        headers["Location"] = f"{prefix_of(request.scope)}/v1/meshes/{mesh.mesh_id}"
+        status = 201 if mesh.is_new else 200
     media_type = query.representation.media_type
-    return result_response(request, result, seconds, media_type, service.results, headers)
+    return result_response(request, result, seconds, media_type, service.results, headers, status)
 
 
 def read(model: type[BaseModel], head: dict[str, Any], body: bytes, settings: Settings) -> Any:
