@@ -1,6 +1,6 @@
 """Bodies and parameters of queries."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import (
@@ -85,6 +85,8 @@ class QueryBody(StrictModel):
         "levels": "max_levels",
     }
     """Setting that bounds the length of a list, by its name"""
+    arrays: ClassVar[Sequence[str]] = ()
+    """Lists of numbers that may come in numpy's format as well, as parts of a form"""
 
     @model_validator(mode="before")
     @classmethod
@@ -161,6 +163,8 @@ class IsolinesRequest(Accuracy, AskingForLines):
             ]
         }
     )
+
+    arrays: ClassVar[Sequence[str]] = ("values",)
 
     method: BoundedMethod = Field(
         default="exact",

@@ -9,8 +9,9 @@ from pydantic import BaseModel
 from app import queries
 from app.encoding import CSV, JSON, NPY, NPZ, OBJ, OCTETS, PLY
 from app.encoding.representation import ARRAYS, TEXTS
+from app.http.query_form import REQUEST
 from app.http.responses import FILE_HEADERS, QUERY_PROBLEMS, documented, problems
-from app.http.routes.query_route import QueryHeaders, QueryRoute, answer
+from app.http.routes.query_route import FORM, QueryHeaders, QueryRoute, answer
 from app.queries import naming_parameters, written_request
 from app.schemas import answers
 from app.schemas.requests import AnswerParameters, PathParameters
@@ -248,6 +249,23 @@ def _responses(operation: Operation) -> dict[int | str, dict[str, Any]]:
     }
 
 
+def _also_as_form(operation: Operation) -> dict[str, Any]:
+    """Return the further kind of body of a query that may have arrays, for OpenAPI."""
+    arrays = operation.kind.model.arrays
+    if not arrays:
+        return {}
+    body = {"$ref": f"#/components/schemas/{operation.kind.model.__name__}"}
+    array = {**_BINARY, "description": "A list of numbers in numpy's format (`.npy`)"}
+    form = {
+        "type": "object",
+        "additionalProperties": False,
+        "required": [REQUEST],
+        "properties": {REQUEST: body, **dict.fromkeys(arrays, array)},
+    }
+    encoding = {REQUEST: {"contentType": JSON}, **{name: {"contentType": NPY} for name in arrays}}
+    return {"requestBody": {"content": {FORM: {"schema": form, "encoding": encoding}}}}
+
+
 for each in OPERATIONS:
     router.add_api_route(
         each.path,
@@ -258,6 +276,7 @@ for each in OPERATIONS:
         description=each.description,
         response_class=Response,
         responses={**_responses(each), **problems(*_BODY_CODES, quota_exceeded=507)},
+        openapi_extra=_also_as_form(each),
     )
 
 
