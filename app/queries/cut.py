@@ -1,6 +1,7 @@
 """A mesh cut along curves: a new mesh, and the way back to the old one."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import chain
 from typing import Any
 
@@ -15,7 +16,7 @@ from app.queries.cost_model import PER_FACE_STORED, PER_POINT
 from app.queries.points import SurfacePoints, numbered, to_point_or_curve
 from app.queries.validation import FAULTS_SHOWN, WrittenPoints, invalid_points, naming
 from app.schemas.requests import CutRequest
-from app.store.meshes import CUT_ARRAYS, OpenMesh
+from app.store.meshes import CUT_ARRAYS, OpenMesh, content_hash
 
 _SNAPPING = 2.0**-30
 """Weight up to which a point counts as on the edge where that weight is 0, see `gc.cut`"""
@@ -41,13 +42,17 @@ class CutQuery(Query[CutRequest]):
         return PER_POINT * points + PER_FACE_STORED * self.size.faces
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
-        """Cut the mesh; the answer has the new one, and the arrays that lead back."""
+        """Cut the mesh; the answer is that of a service, with the mesh and its arrays as views."""
         cut, about = self._cut(opened, points, context)
-        vertices = cut.vertices if opened.mesh.has_positions else None
-        mesh = {"vertices": vertices, "faces": cut.faces, "lengths": cut.mesh.lengths}
-        given = {name: array for name, array in mesh.items() if array is not None}
-        members = {**about, "mesh": given, "arrays": arrays_of(cut)}
-        return Answer(members, surface=Surface(cut.vertices, cut.faces))
+        arrays = {**cut.mesh.arrays(), **arrays_of(cut)}
+        own = {"faces", "lengths", *CUT_ARRAYS}
+        if opened.mesh.has_positions:
+            own.add("vertices")
+        return replace(
+            self.told(content_hash(arrays, self.mesh_id), about),
+            surface=Surface(cut.vertices, cut.faces),
+            named={name: array for name, array in arrays.items() if name in own},
+        )
 
     def make(
         self, opened: OpenMesh, context: ExecutionContext
