@@ -24,6 +24,7 @@ QUERIES: dict[str, dict[str, Any]] = {
     "isolines": {"sources": [INSIDE], "count": 3},
     "borders": {"sources": [INSIDE, {"vertex": 9}]},
     "boundaries": {"barriers": [3]},
+    "cut": {"curves": [{"polyline": [INSIDE]}]},
     "matrix": {"sources": [VERTEX, INSIDE], "targets": [{"vertex": 9}]},
     "nearest": {"source": INSIDE, "candidates": [{"vertex": 9}, VERTEX], "k": 2},
     "log_map": {"source": INSIDE, "x_axis": [1, 0, 0]},
