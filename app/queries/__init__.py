@@ -17,6 +17,7 @@ from app.queries.base import (
 )
 from app.queries.borders import BordersQuery
 from app.queries.boundaries import BoundariesQuery
+from app.queries.cut import CutQuery
 from app.queries.distances import DistancesQuery
 from app.queries.field_cache import FieldCache, Unwritten
 from app.queries.isolines import IsolinesQuery
@@ -40,6 +41,7 @@ KINDS: Mapping[str, type[Query[Any]]] = {
         IsolinesQuery,
         BordersQuery,
         BoundariesQuery,
+        CutQuery,
         MatrixQuery,
         NearestQuery,
         LogMapQuery,
@@ -54,6 +56,7 @@ __all__ = [
     "SMALL_SECONDS",
     "BordersQuery",
     "BoundariesQuery",
+    "CutQuery",
     "DistancesQuery",
     "ExecutionContext",
     "FieldCache",

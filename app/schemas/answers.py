@@ -4,6 +4,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field
 
+from app.schemas.meshes import Sample
 from app.schemas.requests import Layout, Method
 
 StepName = Literal["dijkstra", "shorten", "approximate", "backtrace", "exact", "path"]
@@ -183,6 +184,33 @@ class BoundariesAnswer(BaseModel):
     mesh_id: str
     boundaries: list[BoundaryDocument] = Field(
         description="Closed lines, and open lines that end at an edge of three faces or more"
+    )
+    warnings: list[str]
+
+
+class CutAnswer(BaseModel):
+    """A mesh of which curves are edges, and which is in the store like any other.
+
+    Its arrays tell where all of it was on the mesh that was cut.
+    """
+
+    kind: Literal["cut"]
+    mesh_id: str = Field(description="The mesh that was cut")
+    cut_mesh_id: str = Field(
+        description="The new mesh. For F faces and V vertices it has the arrays `face_of` (F): the "
+        "old face that each is of; `location_faces` (V) and `location_weights` (V, 3): an old face "
+        "that holds each vertex, -1 for none, and the weights in it; `curve_edges` (E, 2): "
+        "vertices of the edges of curves, where they were before the surface came apart; "
+        "`edge_curves` (P, 2): rows of `curve_edges` and the curves that run along them; `copy_of` "
+        "(V): the vertex that each one was before the surface came apart; `parts` (F): the part "
+        "that each face belongs to, bounded by curves"
+    )
+    vertices: int = Field(description="Number of vertices of the new mesh")
+    faces: int = Field(description="Number of faces of the new mesh")
+    parts: int = Field(description="Number of parts that the curves bound")
+    snapped: Sample = Field(
+        description="Points of curves that are within 2**-30 of a vertex or an edge, as a weight, "
+        "and not on it: the curve runs through that instead. Each as a curve and a point of it"
     )
     warnings: list[str]
 

@@ -1,6 +1,6 @@
 """Bodies and parameters of queries."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import (
@@ -13,10 +13,12 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from app.schemas.meshes import MeshName
 from app.schemas.points import (
     MOST_MEMBERS,
     Axis,
     Count,
+    CurveToCut,
     Directions,
     Ends,
     FailFastList,
@@ -83,6 +85,8 @@ class QueryBody(StrictModel):
         "levels": "max_levels",
     }
     """Setting that bounds the length of a list, by its name"""
+    arrays: ClassVar[Sequence[str]] = ()
+    """Lists of numbers that may come in numpy's format as well, as parts of a form"""
 
     @model_validator(mode="before")
     @classmethod
@@ -160,6 +164,8 @@ class IsolinesRequest(Accuracy, AskingForLines):
         }
     )
 
+    arrays: ClassVar[Sequence[str]] = ("values",)
+
     method: BoundedMethod = Field(
         default="exact",
         description="`fast` is not available: lines need windows, which it does not have",
@@ -217,6 +223,37 @@ class BoundariesRequest(AskingForLines):
     """The boundary of the surface. Blocked faces are no part of it: their rim is a boundary."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{}]})
+
+
+class CutRequest(QueryBody):
+    """A surface that is cut along ``curves``, which become edges of a new mesh."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {"curves": [{"polyline": [{"vertex": 0}, {"vertex": 1}]}]},
+                {
+                    "curves": [{"polyline": [0, 1, 3], "closed": True}],
+                    "separate": False,
+                    "name": "terrain with a border",
+                },
+            ]
+        }
+    )
+
+    curves: FailFastList[CurveToCut] = Field(
+        min_length=1,
+        description="At least one. They may cross, touch and overlap, end anywhere, pass through "
+        "vertices and run along edges; one of a single point makes that a vertex",
+    )
+    separate: StrictBool = Field(
+        default=True, description="Whether the surface comes apart along the curves"
+    )
+    name: MeshName | None = Field(
+        default=None,
+        description="Name of the new mesh for people; one that is in the store already keeps its "
+        "own",
+    )
 
 
 class Stops(AmongBarriers):

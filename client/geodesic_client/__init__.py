@@ -3,6 +3,7 @@
 from geodesic_client.answers import (
     Border,
     Boundary,
+    Cut,
     Distances,
     ErrorBound,
     Isoline,
@@ -31,6 +32,7 @@ __all__ = [
     "Border",
     "Boundary",
     "Client",
+    "Cut",
     "Distances",
     "ErrorBound",
     "GeodesicClientError",

@@ -249,6 +249,27 @@ class StraightLine:
     """Radians at the last point; NaN where directions have no meaning"""
 
 
+SurfaceLine = Path | Isoline | Border | Boundary | StraightLine
+"""A line that a mesh can be cut along, where it has its locations"""
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A mesh that was cut along curves, and is in the store of the service."""
+
+    mesh_id: str
+    """The new mesh, for `Client.mesh`, `Client.array` and all queries"""
+    cut_from: str
+    """The mesh that was cut"""
+    vertices: int
+    faces: int
+    parts: int
+    """Number of parts that the curves bound"""
+    snapped: int
+    """Points of curves that were nearly on a vertex or an edge, and moved there"""
+    warnings: Sequence[str]
+
+
 @dataclass(frozen=True)
 class LocatedPoint:
     """The point of the surface that is nearest to a position."""
@@ -373,6 +394,20 @@ def to_boundaries(response: httpx2.Response) -> list[Boundary]:
         Boundary(np.array(line["vertices"], np.int64), **_members_of(line))
         for line in response.json()["boundaries"]
     ]
+
+
+def to_cut(response: httpx2.Response) -> Cut:
+    """Return a cut mesh."""
+    answer = response.json()
+    return Cut(
+        mesh_id=answer["cut_mesh_id"],
+        cut_from=answer["mesh_id"],
+        vertices=answer["vertices"],
+        faces=answer["faces"],
+        parts=answer["parts"],
+        snapped=answer["snapped"]["count"],
+        warnings=answer["warnings"],
+    )
 
 
 def to_matrix(response: httpx2.Response) -> Matrix:

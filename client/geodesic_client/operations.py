@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from io import BytesIO
 from os import PathLike
 from pathlib import Path as FilePath
 from typing import Any, Literal, TypeVar
@@ -19,6 +20,7 @@ from geodesic_client.answers import (
     NPZ,
     Border,
     Boundary,
+    Cut,
     Distances,
     Isolines,
     Job,
@@ -32,9 +34,11 @@ from geodesic_client.answers import (
     Step,
     StoredMatrix,
     StraightLine,
+    SurfaceLine,
     to_array,
     to_borders,
     to_boundaries,
+    to_cut,
     to_distances,
     to_isolines,
     to_job,
@@ -73,13 +77,28 @@ Kind = Literal[
     "isolines",
     "borders",
     "boundaries",
+    "cut",
     "matrix",
     "nearest",
     "log-map",
     "trace",
     "locate",
 ]
-ArrayName = Literal["vertices", "faces", "lengths", "vertex_map", "face_map", "components"]
+ArrayName = Literal[
+    "vertices",
+    "faces",
+    "lengths",
+    "vertex_map",
+    "face_map",
+    "components",
+    "face_of",
+    "location_faces",
+    "location_weights",
+    "curve_edges",
+    "edge_curves",
+    "copy_of",
+    "parts",
+]
 
 _PART_BYTES = 2**23
 """Bytes of a stored matrix that are read at a time"""
@@ -288,7 +307,6 @@ def isolines(
     """
     body = _body(
         sources=None if sources is None else as_points(sources),
-        values=None if values is None else _with_none(values),
         levels=levels,
         count=count,
         method=method,
@@ -299,7 +317,9 @@ def isolines(
         barriers=barriers,
         include=include,
     )
-    return (yield from _ask(mesh, "isolines", body, to_isolines, progress))
+    arrays = {} if values is None else {"values": np.asarray(values, np.float64)}
+    request = _request(mesh, "isolines", body, JSON, arrays=arrays)
+    return (yield from answer(Query(request, to_isolines), progress))
 
 
 def borders(
@@ -333,6 +353,34 @@ def boundaries(
     """Return the boundary of the surface, longest line first; none for a closed surface."""
     body = _body(barriers=barriers, include=include)
     return (yield from _ask(mesh, "boundaries", body, to_boundaries, progress))
+
+
+def cut(
+    mesh: Mesh | str,
+    curves: SurfaceLine | Sequence[SurfaceLine | Sequence[Point]],
+    *,
+    separate: bool = True,
+    name: str | None = None,
+    progress: Progress = ignore_progress,
+) -> Flow[Cut]:
+    """Cut a mesh along curves, which are edges of a new mesh in the store; return that.
+
+    Curves are lines of other answers that have their locations, or lists of points, each in one
+    face with the next. With ``separate`` the surface comes apart along them. `array` returns the
+    arrays that lead back to the old mesh: ``face_of``, ``location_faces``, ``location_weights``,
+    ``curve_edges``, ``edge_curves``, ``copy_of`` and ``parts``.
+    """
+    given = [curves] if isinstance(curves, SurfaceLine) else curves
+    body = _body(curves=list(map(_as_curve, given)), separate=separate, name=name)
+    return (yield from _ask(mesh, "cut", body, to_cut, progress))
+
+
+def _as_curve(curve: SurfaceLine | Sequence[Point]) -> dict[str, Any]:
+    if not isinstance(curve, SurfaceLine):
+        return {"polyline": curve}
+    if not len(curve.locations):
+        raise ValueError('a line has no locations: ask for it with include=["locations"]')
+    return {"polyline": curve.locations, "closed": getattr(curve, "closed", False)}
 
 
 def matrix(
@@ -566,9 +614,12 @@ def _request(
     body: Mapping[str, Any],
     media_type: str,
     parameters: Mapping[str, str] | None = None,
+    arrays: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> Request:
     content = json.dumps(body, default=_as_json, allow_nan=False).encode()
     headers = {"Content-Type": JSON, "Accept": media_type}
+    if arrays:
+        headers["Content-Type"], content = _as_form(content, arrays)
     return Request("POST", f"{_link(mesh)}/{kind}", parameters or {}, headers, content)
 
 
@@ -576,10 +627,15 @@ def _body(**members: Any) -> dict[str, Any]:
     return {name: value for name, value in members.items() if value is not None}
 
 
-def _with_none(values: ArrayLike) -> list[float | None]:
-    """Return numbers as JSON has them: None where they are not finite."""
-    numbers = np.asarray(values, np.float64)
-    return [each if np.isfinite(each) else None for each in numbers.tolist()]
+def _as_form(content: bytes, arrays: Mapping[str, NDArray[np.float64]]) -> tuple[str, bytes]:
+    """Return JSON and arrays in numpy's format as a form: its Content-Type, and its bytes."""
+    parts: dict[str, tuple[None, bytes, str]] = {"request": (None, content, JSON)}
+    for name, array in arrays.items():
+        file = BytesIO()
+        np.save(file, array, allow_pickle=False)
+        parts[name] = None, file.getvalue(), NPY
+    form = httpx2.Request("POST", "http://localhost", files=parts)  # which encodes it
+    return form.headers["Content-Type"], form.read()
 
 
 def _as_json(value: Any) -> Any:
@@ -631,6 +687,7 @@ class Operations:
     isolines = Method(isolines)
     borders = Method(borders)
     boundaries = Method(boundaries)
+    cut = Method(cut)
     matrix = Method(matrix)
     store_matrix = Method(store_matrix)
     matrix_rows = Method(matrix_rows)

@@ -75,6 +75,14 @@ MORE_SEEDS: Mapping[str, tuple[Any, ...]] = {
             "barriers": [7],
         },
     ),
+    "cutMesh": (
+        {
+            "curves": [
+                {"polyline": [0, {"face": 0, "barycentric": [0.2, 0.3, 0.5]}], "closed": True}
+            ],
+            "separate": False,
+        },
+    ),
     "locatePoints": ({"points": [[0.5, 0.5, 1]], "max_distance": 0.5},),
 }
 """What the examples of the interface document do not have"""
