@@ -38,6 +38,7 @@ _OPTIONS = {
     "points": "--at",
     "levels": "--level",
     "starts": "--from",
+    "start": "--from",
     "directions": "--direction",
     "lengths": "--length",
     "curves": "--along",

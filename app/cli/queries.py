@@ -240,6 +240,36 @@ def _of_isolines(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
         )
 
 
+def _spread(given: Given) -> dict[str, Any]:
+    if given["count"] is None and given["radius"] is None:
+        raise typer.BadParameter("give --count or --radius, or both")
+    return {name: given[name] for name in ("count", "radius", "iterations")} | _barriers(given)
+
+
+def _of_samples(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
+    yield f"points      {len(found['points'])}"
+    yield f"reach       {found['covering_radius']!r}"
+    if found["costs"]:
+        state = "converged" if found["converged"] else "not converged"
+        yield f"cost        {found['costs'][0]!r}, then {found['costs'][-1]!r}: {state}"
+
+
+def _of_cells(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
+    for i, area in enumerate(found["areas"]):
+        yield f"cell        of source {i}: {area!r}"
+    yield f"neighbours  {len(found['neighbours'])} pairs"
+
+
+def _weighted(given: Given) -> dict[str, Any]:
+    return {"weights": given["weight"] or None, **_barriers(given)}
+
+
+def _of_mean(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
+    yield from _place(found["mean"])
+    state = "converged" if found["converged"] else "not converged"
+    yield f"variance    {found['variance']!r}, {state} after {found['moves']} moves"
+
+
 def _of_borders(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
     for line in found["borders"]:
         first, second = line["sources"]
@@ -270,13 +300,18 @@ def _of_nearest(given: Given, found: Mapping[str, Any]) -> Iterator[str]:
         yield f"nearest     {given['candidate'][each['candidate']].text} at {each['distance']!r}"
 
 
-def _of_locate(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
-    (point,) = found["points"]
+def _place(point: Mapping[str, Any]) -> Iterator[str]:
     if "vertex" in point:
         yield f"point       v{point['vertex']}"
     else:
         yield f"point       f{point['face']}:{','.join(map(repr, point['barycentric']))}"
-    yield f"position    {','.join(map(repr, point['position']))}"
+    if point["position"] is not None:
+        yield f"position    {','.join(map(repr, point['position']))}"
+
+
+def _of_locate(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
+    (point,) = found["points"]
+    yield from _place(point)
     yield f"distance    {point['distance']!r}"
 
 
@@ -448,6 +483,86 @@ COMMANDS = {
         {},
         _of_boundaries,
         _barriers,
+    ),
+    "farthest": Command(
+        "samples",
+        "Spread points over the surface, each the farthest from those before.",
+        "Spreading points",
+        {
+            "count": (
+                Annotated[
+                    int | None, typer.Option(min=1, help="How many, --from included.")
+                ],
+                None,
+            ),
+            "radius": (
+                Annotated[
+                    float | None,
+                    typer.Option(min=0.0, help="The covering radius to reach, mesh units."),
+                ],
+                None,
+            ),
+            "start": (
+                Annotated[
+                    list[Point] | None,
+                    typer.Option(
+                        "--from",
+                        parser=Point.parse,
+                        metavar="POINT",
+                        help=f"A point to begin with, {SPELLINGS}; vertex 0 by default. May be "
+                        "repeated.",
+                    ),
+                ],
+                None,
+            ),
+            "iterations": (
+                Annotated[
+                    int,
+                    typer.Option(
+                        min=0, help="How often points then move to the middle of their cells."
+                    ),
+                ],
+                0,
+            ),
+            **_POINTS_OUT,
+            "barriers": (Barriers, None),
+        },
+        {"start": "start"},
+        _of_samples,
+        _spread,
+    ),
+    "cells": Command(
+        "cells",
+        "Measure the parts of the surface that are nearest to each source.",
+        "Cutting cells",
+        {
+            "source": (PointOrCurveSources, _NEEDED),
+            **_POINTS_OUT,
+            **_CHORD_ERROR,
+            **_REACH,
+        },
+        {"sources": "source"},
+        _of_cells,
+    ),
+    "mean": Command(
+        "mean",
+        "Find the mean of points: where squared distances from them sum to the least.",
+        "Looking for the mean",
+        {
+            "at": _points("A point; may be repeated."),
+            "weight": (
+                Annotated[
+                    list[float] | None,
+                    typer.Option(min=0.0, help="Its weight; give none, or one for each point."),
+                ],
+                None,
+            ),
+            **_out("answer goes: .json.", ".json"),
+            "barriers": (Barriers, None),
+        },
+        {"points": "at"},
+        _of_mean,
+        _weighted,
     ),
     "cut": Command(
         "cut",

@@ -171,6 +171,75 @@ class BordersAnswer(BaseModel):
     warnings: list[str]
 
 
+class SamplesAnswer(BaseModel):
+    """Points spread over the surface."""
+
+    kind: Literal["samples"]
+    mesh_id: str
+    points: list[ResolvedPoint]
+    radii: list[float | None] = Field(
+        description="The covering radius with the points of `start`, and after each one added; "
+        "`null` while a part of the surface has no point"
+    )
+    covering_radius: float | None = Field(
+        description="The distance of the farthest vertex from the nearest point, at the end"
+    )
+    costs: list[float] = Field(
+        description="The sum of squared distances over the surface, before and after each "
+        "iteration; never rising"
+    )
+    converged: bool | None = Field(
+        description="Whether the last iteration moved no point; null if there were none"
+    )
+    distances: list[float | None] | None = Field(
+        default=None, description="For `include`: in mesh units, `null` where unreachable"
+    )
+    nearest: list[int | None] | None = Field(
+        default=None, description="For `include`: index of the nearest point of each vertex"
+    )
+    warnings: list[str]
+
+
+class Neighbours(BaseModel):
+    """Two cells that share a border."""
+
+    sources: tuple[int, int] = Field(description="Indices into `sources`, the lower one first")
+    length: float = Field(description="The length of their border, in mesh units")
+
+
+class CellsAnswer(BaseModel):
+    """The cells of sources."""
+
+    kind: Literal["cells"]
+    mesh_id: str
+    chord_error: float
+    sources: list[ResolvedSource | ResolvedCurveSource]
+    areas: list[float] = Field(
+        description="In mesh units squared; 0 where other sources are nearer everywhere"
+    )
+    centroids: list[ResolvedPoint | None] | None = Field(
+        description="The middle of each cell, `null` for one without area; null if a source is a "
+        "curve"
+    )
+    neighbours: list[Neighbours]
+    warnings: list[str]
+
+
+class MeanAnswer(BaseModel):
+    """The mean of points on the surface: their Karcher mean."""
+
+    kind: Literal["mean"]
+    mesh_id: str
+    points: list[ResolvedPoint]
+    mean: ResolvedPoint
+    variance: float = Field(
+        description="The weighted mean of the squared distances, in mesh units squared"
+    )
+    converged: bool = Field(description="Whether no point near it is better")
+    moves: int = Field(description="How often the search moved")
+    warnings: list[str]
+
+
 class BoundaryDocument(LineDocument):
     """A polyline of boundary edges, with the surface on its left."""
 

@@ -47,6 +47,9 @@ Effort = Annotated[Literal[1, 2, 4, 8], BeforeValidator(_no_boolean)]
 """A number; `Literal` by itself takes `true` for 1"""
 
 
+Iterations = Annotated[StrictInt, Field(ge=0, le=1000)]
+
+
 class Accuracy(StrictModel):
     """The accuracy of an answer."""
 
@@ -82,6 +85,7 @@ class QueryBody(StrictModel):
     bounded_lists: ClassVar[Mapping[str, str]] = {
         "sources": "max_sources",
         "waypoints": "max_waypoints",
+        "start": "max_sources",
         "levels": "max_levels",
     }
     """Setting that bounds the length of a list, by its name"""
@@ -200,6 +204,14 @@ class IsolinesRequest(Accuracy, AskingForLines):
     )
 
 
+_CHORD_ERROR: Any = Field(
+    default=None,
+    description="Largest distance of chords from the exact lines, which are mostly hyperbolas "
+    "inside faces, in mesh units. At least a billionth of the bounding box's diagonal; a "
+    "thousandth of the mean edge length if not given",
+)
+
+
 class BordersRequest(AskingForLines):
     """The borders of the territories of ``sources``; always exact."""
 
@@ -211,18 +223,72 @@ class BordersRequest(AskingForLines):
     max_distance: NonNegative | None = Field(
         default=None, description="Territories, and with them borders, end at this distance"
     )
-    chord_error: Positive | None = Field(
-        default=None,
-        description="Largest distance of the returned chords from the exact lines, which are "
-        "mostly hyperbolas inside faces, in mesh units. At least a billionth of the bounding box's "
-        "diagonal; a thousandth of the mean edge length if not given",
-    )
+    chord_error: Positive | None = _CHORD_ERROR
 
 
 class BoundariesRequest(AskingForLines):
     """The boundary of the surface. Blocked faces are no part of it: their rim is a boundary."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{}]})
+
+
+class SamplesRequest(AmongBarriers):
+    """Points spread over the surface, each the farthest from those before."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [{"count": 20}, {"radius": 0.5, "start": [{"vertex": 0}], "iterations": 5}]
+        }
+    )
+
+    count: Count | None = Field(
+        default=None, description="The number of points, those of `start` included"
+    )
+    radius: NonNegative | None = Field(
+        default=None,
+        description="The covering radius to reach, in mesh units. Give at least one of the two; "
+        "the first that is reached counts",
+    )
+    start: FailFastList[Point] = Field(
+        default=[], description="The points to begin with; vertex 0 if there are none"
+    )
+    iterations: Iterations = Field(
+        default=0,
+        description="How often the points then move to the middle of what is nearest to each, by "
+        "Lloyd's method; fewer if they converge",
+    )
+    include: FailFastList[Literal["distances"]] = Field(
+        default=[],
+        description="`distances`: also the distance of each vertex from the nearest point, and the "
+        "index of that",
+    )
+
+
+class CellsRequest(AmongBarriers):
+    """The cells of ``sources``: what is nearer to each of them than to the others."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"sources": [{"vertex": 0}, {"vertex": 7}]}]}
+    )
+
+    sources: FailFastList[Source] = Field(min_length=1)
+    max_distance: NonNegative | None = Field(
+        default=None, description="Cells end at this distance, in mesh units"
+    )
+    chord_error: Positive | None = _CHORD_ERROR
+
+
+class MeanRequest(AmongBarriers):
+    """The point whose squared distances from ``points`` sum to the least."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"points": [{"vertex": 0}, {"vertex": 7}]}]}
+    )
+
+    points: FailFastList[Point] = Field(min_length=1)
+    weights: FailFastList[NonNegative] | None = Field(
+        default=None, min_length=1, description="One for each point; the same for all if not given"
+    )
 
 
 class CutRequest(QueryBody):

@@ -20,6 +20,7 @@ from geodesic_client.answers import (
     NPZ,
     Border,
     Boundary,
+    Cells,
     Cut,
     Distances,
     Isolines,
@@ -28,9 +29,11 @@ from geodesic_client.answers import (
     LocatedPoint,
     LogMap,
     Matrix,
+    Mean,
     Mesh,
     Neighbour,
     Path,
+    Samples,
     Step,
     StoredMatrix,
     StraightLine,
@@ -38,6 +41,7 @@ from geodesic_client.answers import (
     to_array,
     to_borders,
     to_boundaries,
+    to_cells,
     to_cut,
     to_distances,
     to_isolines,
@@ -47,10 +51,12 @@ from geodesic_client.answers import (
     to_located,
     to_log_map,
     to_matrix,
+    to_mean,
     to_mesh,
     to_neighbours,
     to_path,
     to_paths,
+    to_samples,
     to_steps,
     to_stored_matrix,
 )
@@ -78,6 +84,9 @@ Kind = Literal[
     "borders",
     "boundaries",
     "cut",
+    "samples",
+    "cells",
+    "mean",
     "matrix",
     "nearest",
     "log-map",
@@ -507,6 +516,59 @@ def nearest(
     return (yield from _ask(mesh, "nearest", body, to_neighbours, progress))
 
 
+def samples(
+    mesh: Mesh | str,
+    count: int | None = None,
+    *,
+    radius: float | None = None,
+    start: Point | Sequence[Point] = (),
+    iterations: int = 0,
+    barriers: Sequence[int] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[Samples]:
+    """Return points spread over a surface, each the farthest from those before.
+
+    Until there are ``count`` of them, or every vertex is within ``radius`` of one. They then move
+    ``iterations`` times to the middle of what is nearest to each.
+    """
+    body = _body(count=count, radius=radius, iterations=iterations, barriers=barriers)
+    body["start"] = as_points(start)
+    return (yield from _ask(mesh, "samples", body, to_samples, progress))
+
+
+def cells(
+    mesh: Mesh | str,
+    sources: Sequence[Point],
+    *,
+    max_distance: float | None = None,
+    chord_error: float | None = None,
+    barriers: Sequence[int] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[Cells]:
+    """Return areas, centroids and neighbours of what is nearest to each source."""
+    body = _body(
+        sources=sources,
+        max_distance=max_distance,
+        chord_error=chord_error,
+        barriers=barriers,
+    )
+    return (yield from _ask(mesh, "cells", body, to_cells, progress))
+
+
+def mean(
+    mesh: Mesh | str,
+    points: Sequence[Point],
+    weights: ArrayLike | None = None,
+    *,
+    barriers: Sequence[int] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[Mean]:
+    """Return the point whose squared distances from some points sum to the least."""
+    given = None if weights is None else np.asarray(weights, np.float64)
+    body = _body(points=as_points(points), weights=given, barriers=barriers)
+    return (yield from _ask(mesh, "mean", body, to_mean, progress))
+
+
 def log_map(
     mesh: Mesh | str,
     source: Point,
@@ -693,6 +755,9 @@ class Operations:
     matrix_rows = Method(matrix_rows)
     save_matrix = Method(save_matrix)
     nearest = Method(nearest)
+    samples = Method(samples)
+    cells = Method(cells)
+    mean = Method(mean)
     log_map = Method(log_map)
     trace = Method(trace)
     locate = Method(locate)

@@ -126,6 +126,39 @@ OPERATIONS = (
         _LINES,
     ),
     Operation(
+        "/samples",
+        queries.SamplesQuery,
+        answers.SamplesAnswer,
+        "samplePoints",
+        "Points spread over the surface, each the farthest from those before",
+        "Return points until there are `count` of them or each vertex is within `radius` of "
+        "one.\n\nThey are vertices, but for those of `start`. With `iterations` they then move to "
+        "the middle of what is nearest\nto each, and are points in faces.",
+        "The points, in the order in which they were added",
+        (CSV,),
+    ),
+    Operation(
+        "/cells",
+        queries.CellsQuery,
+        answers.CellsAnswer,
+        "computeCells",
+        "Areas, centroids and neighbours of the parts that are nearest to each source",
+        "Return what the borders between the territories of sources enclose.\n\nAreas sum to that "
+        "of the surface, or of what is within `max_distance`.",
+        "The cells, in the order of the sources",
+        (CSV,),
+    ),
+    Operation(
+        "/mean",
+        queries.MeanQuery,
+        answers.MeanAnswer,
+        "findMean",
+        "The mean of points on the surface",
+        "Return the point whose squared distances from some points sum to the least.\n\nIt is "
+        "also called their Karcher or Fréchet mean.",
+        "The point, and whether no other near it is better",
+    ),
+    Operation(
         "/cut",
         queries.CutQuery,
         answers.CutAnswer,
