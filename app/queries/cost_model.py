@@ -34,7 +34,7 @@ PER_FACE_BLOCKED = 0.4e-6
 """To make a mesh with barriers: for each of its faces."""
 PER_FACE_SCANNED = 0.02e-6
 """To look for the boundary, or for a level of given values: for each face."""
-PER_FACE_STORED = 4e-6
+PER_FACE_STORED = 3e-6
 """To make a mesh and to store it: for each of its faces."""
 PER_PATH = 0.3e-3
 """To trace a path, and to describe it."""
