@@ -38,7 +38,6 @@ _OPTIONS = {
     "points": "--at",
     "levels": "--level",
     "starts": "--from",
-    "start": "--from",
     "directions": "--direction",
     "lengths": "--length",
     "curves": "--along",

@@ -490,9 +490,7 @@ COMMANDS = {
         "Spreading points",
         {
             "count": (
-                Annotated[
-                    int | None, typer.Option(min=1, help="How many, --from included.")
-                ],
+                Annotated[int | None, typer.Option(min=1, help="How many, --from included.")],
                 None,
             ),
             "radius": (
@@ -527,7 +525,7 @@ COMMANDS = {
             **_POINTS_OUT,
             "barriers": (Barriers, None),
         },
-        {"start": "start"},
+        {"starts": "start"},
         _of_samples,
         _spread,
     ),

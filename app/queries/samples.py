@@ -41,13 +41,14 @@ class SamplesQuery(Query[SamplesRequest]):
         """Refuse a request that does not say how many points there shall be."""
         if request.count is None and request.radius is None:
             raise invalid_fields(["/count", "/radius"], "give at least one of the two")
-        if not request.start:
-            return request.model_copy(update={"start": [BareVertex(vertex=0)]})
+        if not request.starts:
+            return request.model_copy(update={"starts": [BareVertex(vertex=0)]})
         return request
 
     def check_limits(self, settings: Settings) -> None:
         """Refuse too many points."""
-        check_count("points", self.request.count or 0, settings, "max_sources")
+        count = max(self.request.count or 0, len(self.request.starts))
+        check_count("points", count, settings, "max_sources")
 
     def value_count(self) -> int:
         """Return the number of values that are known before."""
@@ -56,7 +57,7 @@ class SamplesQuery(Query[SamplesRequest]):
 
     def written_points(self) -> WrittenPoints:
         """Yield the starts."""
-        return numbered("/start", self.request.start)
+        return numbered("/starts", self.request.starts)
 
     def rough_seconds(self) -> float:
         """Return the cost of all sweeps."""
@@ -77,7 +78,7 @@ class SamplesQuery(Query[SamplesRequest]):
         found, distances, nearest = spread.points, spread.distances, spread.nearest
         moved: dict[str, Any] = {"costs": [], "converged": None}
         if request.iterations:
-            with naming((gc.errors.NoTangentPlane, "/start")):
+            with naming((gc.errors.NoTangentPlane, "/starts")):
                 relaxed = gc.relax_points(
                     mesh, found, request.iterations, **context.part(1, parts).options
                 )

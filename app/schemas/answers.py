@@ -178,7 +178,7 @@ class SamplesAnswer(BaseModel):
     mesh_id: str
     points: list[ResolvedPoint]
     radii: list[float | None] = Field(
-        description="The covering radius with the points of `start`, and after each one added; "
+        description="The covering radius with the points of `starts`, and after each one added; "
         "`null` while a part of the surface has no point"
     )
     covering_radius: float | None = Field(

@@ -85,7 +85,6 @@ class QueryBody(StrictModel):
     bounded_lists: ClassVar[Mapping[str, str]] = {
         "sources": "max_sources",
         "waypoints": "max_waypoints",
-        "start": "max_sources",
         "levels": "max_levels",
     }
     """Setting that bounds the length of a list, by its name"""
@@ -237,19 +236,19 @@ class SamplesRequest(AmongBarriers):
 
     model_config = ConfigDict(
         json_schema_extra={
-            "examples": [{"count": 20}, {"radius": 0.5, "start": [{"vertex": 0}], "iterations": 5}]
+            "examples": [{"count": 20}, {"radius": 0.5, "starts": [{"vertex": 0}], "iterations": 5}]
         }
     )
 
     count: Count | None = Field(
-        default=None, description="The number of points, those of `start` included"
+        default=None, description="The number of points, those of `starts` included"
     )
     radius: NonNegative | None = Field(
         default=None,
         description="The covering radius to reach, in mesh units. Give at least one of the two; "
         "the first that is reached counts",
     )
-    start: FailFastList[Point] = Field(
+    starts: FailFastList[Point] = Field(
         default=[], description="The points to begin with; vertex 0 if there are none"
     )
     iterations: Iterations = Field(

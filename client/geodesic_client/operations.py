@@ -532,7 +532,7 @@ def samples(
     ``iterations`` times to the middle of what is nearest to each.
     """
     body = _body(count=count, radius=radius, iterations=iterations, barriers=barriers)
-    body["start"] = as_points(start)
+    body["starts"] = as_points(start)
     return (yield from _ask(mesh, "samples", body, to_samples, progress))
 
 

@@ -132,7 +132,7 @@ OPERATIONS = (
         "samplePoints",
         "Points spread over the surface, each the farthest from those before",
         "Return points until there are `count` of them or each vertex is within `radius` of "
-        "one.\n\nThey are vertices, but for those of `start`. With `iterations` they then move to "
+        "one.\n\nThey are vertices, but for those of `starts`. With `iterations` they then move to "
         "the middle of what is nearest\nto each, and are points in faces.",
         "The points, in the order in which they were added",
         (CSV,),
