@@ -1,0 +1,112 @@
+"""Loops around and through the handles of a surface, pulled tight.
+
+Holes are closed by a face each, which changes no handle. A tree and a cotree (Eppstein 2003) leave
+two edges for each handle over. Each of them closes a loop through the faces of the dual tree, which
+leads along shortest paths from a vertex: the shortest loops through that vertex that generate the
+homology (Erickson and Whittlesey, *Greedy Optimal Homotopy and Homology Generators*, 2005, there
+along edges). Pulling them tight does not change their kinds.
+"""
+
+import numpy as np
+
+from geodesic_core.arrays import Floats, Ints, Longs
+from geodesic_core.control import Control
+from geodesic_core.fields.distance_field import solve
+from geodesic_core.fields.question import Question
+from geodesic_core.fields.sweeps import ExactSweep
+from geodesic_core.kernels.mesh.half_edges import HEAD, NO_FACE, OPPOSITE, TAIL
+from geodesic_core.loops.covers import require_two_sided
+from geodesic_core.loops.cut_graph import spanning
+from geodesic_core.loops.straighten import loop_of
+from geodesic_core.mesh.surface_curve import SurfaceCurve
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
+
+
+def handle_loops_of(mesh: TriangleMesh, control: Control) -> list[SurfaceCurve]:
+    """Return two loops for each handle, shortest first.
+
+    Raises
+    ------
+    InvalidMesh
+        The surface has no two sides.
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As the control says.
+    """
+    require_two_sided(mesh)
+    links = mesh.topology.links
+    if len(links) == 0:
+        return []
+    opposite = links[:, OPPOSITE].astype(np.int64)
+    inner = np.flatnonzero(opposite > np.arange(len(links)))
+    rim = np.flatnonzero(opposite == NO_FACE)
+    distances = _from_one_each(mesh, control)
+    edges = np.concatenate([inner, rim])
+    far = distances[links[edges, TAIL]] + distances[links[edges, HEAD]]
+    is_rim = np.arange(len(edges)) >= len(inner)
+    # Faces that close holes are leaves of the dual tree: no loop leads through them
+    beyond = np.concatenate([opposite[inner] // 3, len(links) // 3 + _holes(links, rim)])
+    in_disc = spanning(edges // 3, beyond, np.lexsort((far, is_rim)))
+    rest = np.flatnonzero(~in_disc)
+    edges_left, order = edges[rest], np.lexsort((-far[rest], ~is_rim[rest]))
+    in_tree = spanning(links[edges_left, TAIL], links[edges_left, HEAD], order)
+    up = _half_edges_up(links, inner[in_disc[: len(inner)]])
+    loops = [loop_of(mesh, _cycle(links, up, h), control) for h in edges_left[~in_tree].tolist()]
+    return sorted(loops, key=lambda loop: loop.length)
+
+
+def _from_one_each(mesh: TriangleMesh, control: Control) -> Floats:
+    """Return the distances of the inner vertices from one vertex of their component."""
+    topology = mesh.topology
+    on_faces = np.unique(topology.outer_vertex[topology.links[:, TAIL]])
+    _, first = np.unique(topology.component[on_faces], return_index=True)
+    question = Question.of(mesh, on_faces[first].tolist(), [], np.inf, control)
+    distances: Floats = solve(ExactSweep(question), "distances", control).distances
+    return distances[topology.outer_vertex]
+
+
+def _holes(links: Ints, rim: Longs) -> Longs:
+    """Return the hole at which each half-edge of the boundary is, by number."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    tails, heads = links[rim, TAIL], links[rim, HEAD]
+    size = int(links[:, [TAIL, HEAD]].max()) + 1
+    graph = coo_array((np.ones(len(rim), np.int8), (tails, heads)), shape=(size, size))
+    holes: Longs = connected_components(graph, directed=False)[1][tails]
+    return holes
+
+
+def _half_edges_up(links: Ints, tree: Longs) -> Longs:
+    """Return (F,): the half-edge of each face over which its parent in the dual tree is, or -1."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import breadth_first_order, connected_components
+
+    count = len(links) // 3
+    both = np.concatenate([tree, links[tree, OPPOSITE]])
+    faces, beyond = both // 3, links[both, OPPOSITE] // 3
+    graph = coo_array((np.ones(len(both)), (faces, beyond)), shape=(count, count)).tocsr()
+    _, part = connected_components(graph, directed=False)
+    up = np.full(count, -1)
+    for root in np.unique(part, return_index=True)[1].tolist():
+        _, parent = breadth_first_order(graph, root, directed=True)
+        is_up = parent[faces] == beyond
+        up[faces[is_up]] = both[is_up]
+    return up
+
+
+def _cycle(links: Ints, up: Longs, h: int) -> Ints:
+    """Return the portals of the loop that crosses a half-edge, and then stays in the dual tree."""
+
+    def way_up(face: int) -> list[int]:
+        way = []
+        while up[face] >= 0:
+            way.append(int(up[face]))
+            face = int(links[way[-1], OPPOSITE]) // 3
+        return way
+
+    here, there = way_up(h // 3), way_up(int(links[h, OPPOSITE]) // 3)
+    while here and there and here[-1] == there[-1]:
+        here.pop()
+        there.pop()
+    ways = [h, *links[here, OPPOSITE].tolist(), *reversed(there)]
+    return np.array(ways, np.int32)
