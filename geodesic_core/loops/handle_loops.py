@@ -9,7 +9,7 @@ along edges). Pulling them tight does not change their kinds.
 
 import numpy as np
 
-from geodesic_core.arrays import Floats, Ints, Longs
+from geodesic_core.arrays import Ints, Longs
 from geodesic_core.control import Control
 from geodesic_core.fields.distance_field import solve
 from geodesic_core.fields.question import Question
@@ -20,6 +20,7 @@ from geodesic_core.loops.cut_graph import spanning
 from geodesic_core.loops.straighten import loop_of
 from geodesic_core.mesh.surface_curve import SurfaceCurve
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.tolerances import SHORTER
 
 
 def handle_loops_of(mesh: TriangleMesh, control: Control) -> list[SurfaceCurve]:
@@ -33,13 +34,36 @@ def handle_loops_of(mesh: TriangleMesh, control: Control) -> list[SurfaceCurve]:
         As the control says.
     """
     require_two_sided(mesh)
+    topology = mesh.topology
+    on_faces = np.unique(topology.outer_vertex[topology.links[:, TAIL]])
+    parts, first = np.unique(topology.component[on_faces], return_index=True)
+    roots = on_faces[first]
+    best = _loops_through(mesh, roots, control) if len(roots) else []
+    while best:
+        # A loop that is tight has sunk to where its handle is thin: from there others are shorter
+        vertices = best[-1].located.vertices
+        root = vertices[vertices >= 0][0]
+        roots[parts == topology.component[root]] = root
+        loops = _loops_through(mesh, roots, control)
+        if _total(loops) >= _total(best) * (1.0 - SHORTER):
+            break
+        best = loops
+    return best
+
+
+def _total(loops: list[SurfaceCurve]) -> float:
+    return sum(loop.length for loop in loops)
+
+
+def _loops_through(mesh: TriangleMesh, roots: Longs, control: Control) -> list[SurfaceCurve]:
+    """Return the loops of the handles, once shortest through roots, one in each component."""
     links = mesh.topology.links
-    if len(links) == 0:
-        return []
     opposite = links[:, OPPOSITE].astype(np.int64)
     inner = np.flatnonzero(opposite > np.arange(len(links)))
     rim = np.flatnonzero(opposite == NO_FACE)
-    distances = _from_one_each(mesh, control)
+    question = Question.of(mesh, roots.tolist(), [], np.inf, control)
+    field = solve(ExactSweep(question), "distances", control)
+    distances = field.distances[mesh.topology.outer_vertex]
     edges = np.concatenate([inner, rim])
     far = distances[links[edges, TAIL]] + distances[links[edges, HEAD]]
     is_rim = np.arange(len(edges)) >= len(inner)
@@ -52,16 +76,6 @@ def handle_loops_of(mesh: TriangleMesh, control: Control) -> list[SurfaceCurve]:
     up = _half_edges_up(links, inner[in_disc[: len(inner)]])
     loops = [loop_of(mesh, _cycle(links, up, h), control) for h in edges_left[~in_tree].tolist()]
     return sorted(loops, key=lambda loop: loop.length)
-
-
-def _from_one_each(mesh: TriangleMesh, control: Control) -> Floats:
-    """Return the distances of the inner vertices from one vertex of their component."""
-    topology = mesh.topology
-    on_faces = np.unique(topology.outer_vertex[topology.links[:, TAIL]])
-    _, first = np.unique(topology.component[on_faces], return_index=True)
-    question = Question.of(mesh, on_faces[first].tolist(), [], np.inf, control)
-    distances: Floats = solve(ExactSweep(question), "distances", control).distances
-    return distances[topology.outer_vertex]
 
 
 def _holes(links: Ints, rim: Longs) -> Longs:

@@ -17,7 +17,7 @@ from geodesic_core.fields.path import EXACT, GeodesicPath
 from geodesic_core.fields.sources import component_of, disconnected
 from geodesic_core.kernels.mesh.half_edges import BOUNDARY, HEAD, LENGTH, NO_FACE, OPPOSITE, TAIL
 from geodesic_core.loops.covers import Cover, cover_of, require_two_sided
-from geodesic_core.loops.straighten import crossings_around
+from geodesic_core.loops.straighten import strip_around
 from geodesic_core.mesh.surface_curve import SurfaceCurve, runs_as_wound
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -58,10 +58,27 @@ def paths_on_both_sides(
         path = cover.lowered(search.find(start, end, part, explain=False))
         paths.append(GeodesicPath(**vars(path), error_bound=EXACT, steps=None))
     first, second = paths
-    turns = crossings_around(first, second, line)
-    if not runs_as_wound(mesh, int(line[0]) // 3):
-        turns = -turns
-    return (first, second) if turns <= 0 else (second, first)
+    turns = _turns(first, second, line, int(obstacle[0]))
+    is_left = (turns <= 0) == runs_as_wound(mesh, int(line[0]) // 3)
+    return (first, second) if is_left else (second, first)
+
+
+def _turns(first: GeodesicPath, second: GeodesicPath, line: Longs, obstacle: int) -> int:
+    """Return how often the way along one path, and back along another, runs around the obstacle.
+
+    Counted counter-clockwise on inner faces. Where one of the paths runs through it, the strip of
+    that path passes it on the side of the other path.
+    """
+    links = first.on_mesh().topology.links
+    strip = strip_around(first, second)
+    back = links[strip, OPPOSITE]
+    turns = int(np.isin(strip, line).sum()) - int(np.isin(back, line).sum())
+    for path, sign in ((first, -1), (second, 1)):
+        if turns == 0 and path.on_mesh().topology.outer_vertex[obstacle] in path.located.vertices:
+            portals = strip_around(path)
+            has_it_left = (links[portals, TAIL] == obstacle).any()
+            turns = sign if has_it_left else -sign
+    return turns
 
 
 def obstacle_of(

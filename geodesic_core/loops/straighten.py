@@ -217,15 +217,12 @@ def curve_through(
     return SurfaceCurve(mesh, outer, closed, length, located)
 
 
-def crossings_around(first: SurfaceCurve, second: SurfaceCurve, half_edges: Longs) -> int:
-    """Return how often a loop enters faces over half-edges, less how often over their opposites.
-
-    The loop leads along one curve, and back along another with the same ends.
-    """
+def strip_around(first: SurfaceCurve, second: SurfaceCurve | None = None) -> Ints:
+    """Return the portals along a curve, or around the loop that leads back along another one."""
     mesh = first.on_mesh()
-    lines = [_Line(each._inner_faces, *each._segments()[1:]) for each in (first, second.reversed())]
+    curves = [first] if second is None else [first, second.reversed(), first]
+    lines = [_Line(each._inner_faces, *each._segments()[1:]) for each in curves]
+    if second is not None:
+        lines[2] = _Line(*(rows[:1] for rows in lines[2]))
     line = _Line(*(np.concatenate(rows) for rows in zip(*lines, strict=True)))
-    strip = _Line(*(np.concatenate([rows, rows[:1]]) for rows in line)).strips(mesh)[0]
-    entered = np.isin(strip.portals, half_edges)
-    left = np.isin(mesh.topology.links[strip.portals, OPPOSITE], half_edges)
-    return int(entered.sum()) - int(left.sum())
+    return line.strips(mesh)[0].portals

@@ -12,6 +12,7 @@ PARTS = [
     "compilation",
     "solvers",
     "matrices",
+    "loops",
     "cutting",
     "search",
     "fields",
