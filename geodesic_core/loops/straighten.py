@@ -63,20 +63,25 @@ def straightened_curve(curve: SurfaceCurve, control: Control) -> SurfaceCurve:
     Cancelled, DeadlineExceeded
         As the control says.
     """
-    mesh, starts, ends = curve._segments()
-    line = _Line(curve._inner_faces, starts, ends)
-    if len(line.faces) == 0:
-        if curve.closed:
-            raise _shrunk()
-        return curve
-    if not curve.closed:
-        strips = [_straightened(mesh, strip)[:2] for strip in line.strips(mesh)]
-        return curve_in(mesh, strips, closed=False)
-    first = line.first_break(mesh)
-    if first is None:
-        return straight_loop(mesh, line.strips(mesh)[0], control)
-    strips = [_straightened(mesh, strip)[:2] for strip in line.turned(first).strips(mesh)]
-    return curve_in(mesh, strips, closed=True)
+    pieces = None
+    while pieces is None or pieces > 1:
+        mesh, starts, ends = curve._segments()
+        line = _Line(curve._inner_faces, starts, ends)
+        if len(line.faces) == 0:
+            break
+        first = line.first_break(mesh) if curve.closed else 0
+        if first is None:
+            return straight_loop(mesh, line.strips(mesh)[0], control)
+        strips = line.turned(first).strips(mesh)
+        if pieces is not None and len(strips) >= pieces:
+            break
+        # Where a piece between two sheets has shrunk to nothing, those beside it may be one
+        pieces = len(strips)
+        pulled = [_straightened(mesh, strip) for strip in strips]
+        curve = curve_in(mesh, pulled, closed=curve.closed)
+    if curve.closed and len(curve.faces) == 0:
+        raise _shrunk()
+    return curve
 
 
 def loop_of(mesh: TriangleMesh, portals: Ints, control: Control) -> SurfaceCurve:

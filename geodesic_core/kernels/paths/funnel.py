@@ -124,24 +124,27 @@ def straightened(
 
 @kernel
 def strip_along(
-    topology: Topology, faces: Longs, starts: Floats, ends: Floats, first: int
+    topology: Topology, faces: Longs, starts: Floats, ends: Floats, begin: int
 ) -> tuple[Strip, int]:
     """Return the strip of a line, and its first segment that no strip joins to those before.
 
     ``faces`` (N,) hold the segments, from the weights of a row of ``starts`` to that of ``ends``;
-    the line begins with segment ``first``.
+    the line begins with segment ``begin``.
     """
-    portals, size, i = np.empty(64, np.int32), 0, first
+    portals, size, i = np.empty(64, np.int32), 0, begin
     while i + 1 < len(faces):
         f, g, corner = faces[i], faces[i + 1], corner_with(ends[i], 1.0)
         if f != g and corner >= 0:
-            v = topology.links[3 * f + corner, TAIL]
-            degree = topology.first_corner[v + 1] - topology.first_corner[v]
+            degree = fan_size(topology, 3 * f + corner)
             portals = with_room(portals, size, degree)
+            first = angles_at_tail(topology, 3 * f + corner, starts[i])
+            h = half_edge_from(topology.links, g, topology.links[3 * f + corner, TAIL])
+            last = angles_at_tail(topology, h, ends[i + 1])
             right, right_angle = around_vertex(topology, f, corner, g, RIGHT, portals, size)
-            way, end = RIGHT, right
             left, left_angle = around_vertex(topology, f, corner, g, LEFT, portals, size)
-            if left >= 0 and (right < 0 or left_angle <= right_angle):
+            way, end = RIGHT, right
+            right_angle += first[0] + last[1]
+            if left >= 0 and (right < 0 or left_angle + first[1] + last[0] <= right_angle):
                 way, end = LEFT, left
             if end < 0:
                 break
@@ -156,8 +159,32 @@ def strip_along(
             size = reduced(topology.links, portals, size, size + 1)
         i += 1
     ends_of = np.empty((2, 3))
-    ends_of[0], ends_of[1] = starts[first], ends[i]
-    return Strip(portals[:size].copy(), np.array([faces[first], faces[i]]), ends_of), i + 1
+    ends_of[0], ends_of[1] = starts[begin], ends[i]
+    return Strip(portals[:size].copy(), np.array([faces[begin], faces[i]]), ends_of), i + 1
+
+
+@inlined
+def fan_size(topology: Topology, h: int) -> int:
+    """Number of faces at the tail of a half-edge."""
+    v = topology.links[h, TAIL]
+    return topology.first_corner[v + 1] - topology.first_corner[v]
+
+
+@inlined
+def half_edge_from(links: Ints, face: int, v: int) -> int:
+    """Half-edge of a face that leaves its corner v."""
+    h = 3 * face
+    while links[h, TAIL] != v:
+        h += 1
+    return h
+
+
+@kernel
+def angles_at_tail(topology: Topology, h: int, weights: Floats) -> tuple[float, float]:
+    """Angles at the tail of h between it and a point of its face, and from there on, radians."""
+    x, y = point_in_frame(topology.geometry, h, weights)
+    angle = math.atan2(y, x)
+    return angle, angle_at(topology.geometry, h, LEFT) - angle
 
 
 @kernel
@@ -404,8 +431,9 @@ def around_bends(
 
     Return whether its portals differ, and them.
     """
-    links, portals, bends, sides = topology.links, strip.portals, string.bends, string.sides
-    room = len(portals)
+    links, portals = topology.links, strip.portals
+    string = with_touched(string, straight)
+    bends, sides, room = string.bends, string.sides, len(portals)
     for k in range(len(bends)):
         v = links[portals[bends[k]], TAIL if sides[k] == LEFT else HEAD]
         room += topology.first_corner[v + 1] - topology.first_corner[v]
@@ -439,6 +467,51 @@ def around_bends(
     end = size + len(portals) - copied
     other[size:end] = portals[copied:]
     return True, other[: reduced(links, other, size, end)]
+
+
+@kernel
+def with_touched(string: String, straight: float) -> String:
+    """Return a string that also counts as bends what it passes straight: ends of portals on it.
+
+    Beside a tip, the other side of such a vertex may be shorter.
+    """
+    ends, size, k, count = string.ends, len(string.ends) - 1, 0, 0
+    bends, sides = np.empty(2 * size, np.int32), np.empty(2 * size, np.int8)
+    ax, ay = 0.0, 0.0
+    for i in range(size):
+        portal, column = size, 0
+        if k < len(string.bends):
+            portal, column = string.bends[k], 0 if string.sides[k] == LEFT else 2
+        bx, by = ends[portal, column], ends[portal, column + 1]
+        for side in (LEFT, RIGHT):
+            end = 0 if side == LEFT else 2
+            x, y = ends[i, end], ends[i, end + 1]
+            is_bend = portal < size and end == column and x == bx and y == by
+            if is_bend:
+                is_new = i == portal
+            else:
+                is_new = is_between(ax, ay, bx, by, x, y, straight) and (
+                    i == 0 or ends[i - 1, end] != x or ends[i - 1, end + 1] != y
+                )
+            if is_new:
+                bends[count], sides[count] = i, side
+                count += 1
+        is_bend = portal < size and i >= portal
+        if is_bend and (ends[i + 1, column] != bx or ends[i + 1, column + 1] != by):
+            ax, ay, k = bx, by, k + 1
+    return String(ends, bends[:count], sides[:count], string.length)
+
+
+@inlined
+def is_between(
+    ax: float, ay: float, bx: float, by: float, x: float, y: float, straight: float
+) -> bool:
+    """Whether a point is on the line from a to b, seen from both but for an angle."""
+    to_a, to_b = math.hypot(x - ax, y - ay), math.hypot(x - bx, y - by)
+    off = abs(area(ax, ay, bx, by, x, y))
+    is_inside = (x - ax) * (bx - ax) + (y - ay) * (by - ay) > 0.0
+    is_inside = is_inside and (x - bx) * (ax - bx) + (y - by) * (ay - by) > 0.0
+    return is_inside and off <= straight * math.hypot(bx - ax, by - ay) * min(to_a, to_b)
 
 
 @kernel
