@@ -408,9 +408,10 @@ SHORTER = 1e-14
 """Share of its length that a loop is to gain by a round: less is rounding, and ends it."""
 
 MOST_PASSES = 10_000
-"""Passes over a strip, and rounds of a loop, after which straightening ends in an `InternalError`.
+"""Passes over a strip, beside one for each face, after which straightening is an `InternalError`.
 
-A strip moves on by a vertex in each pass. Measured: at most 200, on curves that wind across a mesh.
+In a pass, a strip moves on by a vertex at each bend. Measured: 560 where a curve moves across half
+of a sphere of 20,000 faces.
 """
 
 FAR_NEARER = 1.01

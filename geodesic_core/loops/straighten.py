@@ -111,7 +111,8 @@ def straight_loop(mesh: TriangleMesh, strip: Strip, control: Control) -> Surface
 
 
 def _straightened(mesh: TriangleMesh, strip: Strip) -> tuple[Strip, String]:
-    strip, string, is_done = funnel.straightened(mesh.topology, strip, TAUT, 0.0, MOST_PASSES)
+    passes = MOST_PASSES + len(mesh.faces)
+    strip, string, is_done = funnel.straightened(mesh.topology, strip, TAUT, 0.0, passes)
     if not is_done:
         raise _endless()
     return strip, string
@@ -122,9 +123,7 @@ def _shrunk() -> NoLoop:
 
 
 def _endless() -> InternalError:
-    return InternalError(
-        f"a curve is not straight after {MOST_PASSES} passes; please report this mesh"
-    )
+    return InternalError("a curve is not straight after many passes; please report this mesh")
 
 
 def _at_bend(mesh: TriangleMesh, strip: Strip, string: String) -> Strip:
