@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Longs
+from geodesic_core.control import Control
 from geodesic_core.errors import InvalidMesh
 from geodesic_core.kernels.mesh.half_edges import FANS, LENGTH, OPPOSITE, SEAM, TAIL
 from geodesic_core.loops.straighten import curve_through
@@ -51,17 +52,24 @@ class Cover(NamedTuple):
         )
 
 
-def cover_of(mesh: TriangleMesh, across: Longs, kept: NDArray[np.bool_]) -> Cover:
+def cover_of(mesh: TriangleMesh, across: Longs, kept: NDArray[np.bool_], control: Control) -> Cover:
     """Return the cover with some faces of each sheet.
 
     ``across`` (S, 3F): the sheet into which one comes from a sheet over a half-edge, or -1.
     ``kept`` (F,): the inner faces that sheets have.
+
+    Raises
+    ------
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As the control says, before it is made.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     links, geometry = mesh.topology.links, mesh.topology.geometry
     sheets, count = across.shape
+    control.checkpoint(0.0)
+    control.check_memory(sheets * mesh.nbytes)
     faces = np.flatnonzero(kept)
     opposite = links[:, OPPOSITE].astype(np.int64)
     inner = np.flatnonzero(kept[np.arange(count) // 3] & (opposite >= 0))
@@ -76,9 +84,7 @@ def cover_of(mesh: TriangleMesh, across: Longs, kept: NDArray[np.bool_]) -> Cove
     _, vertex_of = connected_components(graph, directed=False)
     copies = (np.arange(sheets)[:, None] * (count // 3) + faces).reshape(-1)
     corners = 3 * copies[:, None] + np.arange(3)
-    labels, first, cover_faces = np.unique(
-        vertex_of[corners], return_index=True, return_inverse=True
-    )
+    _, first, cover_faces = np.unique(vertex_of[corners], return_index=True, return_inverse=True)
     cover_faces = cover_faces.reshape(-1, 3)
     below = mesh.topology.outer_vertex[links[corners.reshape(-1)[first] % count, TAIL]]
     if mesh.lengths is None:

@@ -10,6 +10,7 @@ All boundary vertices count as one. Without a boundary one relation is left, the
 of a walk around the root of the tree.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -53,9 +54,10 @@ def cut_graph(topology: Topology, edges: Longs, distances: Floats) -> CutGraph:
         word_by_half_edge[int(links[h, OPPOSITE])] = (-i,)
     is_closed = not is_rim[links[edges, TAIL]].any() and not is_rim[links[edges, HEAD]].any()
     root = int(tails[0]) if is_closed and len(edges) else len(is_rim)
-    up = _half_edges_up(links, edges[in_tree], nodes, root)
+    tree = np.concatenate([edges[in_tree], links[edges[in_tree], OPPOSITE]])
+    up = half_edges_up(tree, nodes[links[tree, TAIL]], nodes[links[tree, HEAD]], [root])
     for v in _from_the_leaves(links, letters, nodes, up, root):
-        h = up[v]
+        h = int(up[v])
         word = inverse(_word_around(links, h, word_by_half_edge))
         word_by_half_edge[h] = word
         word_by_half_edge[int(links[h, OPPOSITE])] = inverse(word)
@@ -88,23 +90,25 @@ def spanning(starts: Longs, ends: Longs, order: Longs) -> NDArray[np.bool_]:
     return chosen
 
 
-def _half_edges_up(links: Ints, tree: Longs, nodes: Longs, root: int) -> dict[int, int]:
-    """Return the half-edge from each vertex of a tree to its parent."""
+def half_edges_up(half_edges: Longs, starts: Longs, ends: Longs, roots: Sequence[int]) -> Longs:
+    """Return for each node of a forest the half-edge that leads to its parent, -1 at roots.
+
+    ``half_edges`` has both of each edge, which lead from a node ``starts`` to one ``ends``.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import breadth_first_order
 
-    both = np.concatenate([tree, links[tree, OPPOSITE]])
-    tails, heads = nodes[links[both, TAIL]], nodes[links[both, HEAD]]
-    size = len(nodes) + 1
-    graph = coo_array((np.ones(len(both)), (tails, heads)), shape=(size, size)).tocsr()
-    _, parent = breadth_first_order(graph, root, directed=True)
-    is_up = parent[tails] == heads
-    return dict(zip(tails[is_up].tolist(), both[is_up].tolist(), strict=True))
+    size = int(max(starts.max(initial=0), *roots)) + 1
+    graph = coo_array((np.ones(len(starts)), (starts, ends)), shape=(size, size)).tocsr()
+    up = np.full(size, -1)
+    for root in roots:
+        _, parent = breadth_first_order(graph, root, directed=True)
+        is_up = parent[starts] == ends
+        up[starts[is_up]] = half_edges[is_up]
+    return up
 
 
-def _from_the_leaves(
-    links: Ints, letters: Longs, nodes: Longs, up: dict[int, int], root: int
-) -> list[int]:
+def _from_the_leaves(links: Ints, letters: Longs, nodes: Longs, up: Longs, root: int) -> list[int]:
     """Return the vertices between letters and the root, each after those that hang on it."""
     depth: dict[int, int] = {root: 0}
     for v in nodes[links[letters][:, [TAIL, HEAD]]].reshape(-1).tolist():

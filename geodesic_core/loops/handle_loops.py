@@ -16,7 +16,7 @@ from geodesic_core.fields.question import Question
 from geodesic_core.fields.sweeps import ExactSweep
 from geodesic_core.kernels.mesh.half_edges import HEAD, NO_FACE, OPPOSITE, TAIL
 from geodesic_core.loops.covers import require_two_sided
-from geodesic_core.loops.cut_graph import spanning
+from geodesic_core.loops.cut_graph import half_edges_up, spanning
 from geodesic_core.loops.straighten import loop_of
 from geodesic_core.mesh.surface_curve import SurfaceCurve
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -37,7 +37,7 @@ def handle_loops_of(mesh: TriangleMesh, control: Control) -> list[SurfaceCurve]:
     topology = mesh.topology
     on_faces = np.unique(topology.outer_vertex[topology.links[:, TAIL]])
     parts, first = np.unique(topology.component[on_faces], return_index=True)
-    roots = on_faces[first]
+    roots = on_faces[first].astype(np.int64)
     best = _loops_through(mesh, roots, control) if len(roots) else []
     while best:
         # A loop that is tight has sunk to where its handle is thin: from there others are shorter
@@ -73,7 +73,11 @@ def _loops_through(mesh: TriangleMesh, roots: Longs, control: Control) -> list[S
     rest = np.flatnonzero(~in_disc)
     edges_left, order = edges[rest], np.lexsort((-far[rest], ~is_rim[rest]))
     in_tree = spanning(links[edges_left, TAIL], links[edges_left, HEAD], order)
-    up = _half_edges_up(links, inner[in_disc[: len(inner)]])
+    tree = inner[in_disc[: len(inner)]]
+    tree = np.concatenate([tree, opposite[tree]])
+    parts = mesh.topology.component[mesh.topology.outer_vertex[links[::3, TAIL]]]
+    first_faces = np.unique(parts, return_index=True)[1].tolist()
+    up = half_edges_up(tree, tree // 3, opposite[tree] // 3, first_faces)
     loops = [loop_of(mesh, _cycle(links, up, h), control) for h in edges_left[~in_tree].tolist()]
     return sorted(loops, key=lambda loop: loop.length)
 
@@ -88,24 +92,6 @@ def _holes(links: Ints, rim: Longs) -> Longs:
     graph = coo_array((np.ones(len(rim), np.int8), (tails, heads)), shape=(size, size))
     holes: Longs = connected_components(graph, directed=False)[1][tails]
     return holes
-
-
-def _half_edges_up(links: Ints, tree: Longs) -> Longs:
-    """Return (F,): the half-edge of each face over which its parent in the dual tree is, or -1."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import breadth_first_order, connected_components
-
-    count = len(links) // 3
-    both = np.concatenate([tree, links[tree, OPPOSITE]])
-    faces, beyond = both // 3, links[both, OPPOSITE] // 3
-    graph = coo_array((np.ones(len(both)), (faces, beyond)), shape=(count, count)).tocsr()
-    _, part = connected_components(graph, directed=False)
-    up = np.full(count, -1)
-    for root in np.unique(part, return_index=True)[1].tolist():
-        _, parent = breadth_first_order(graph, root, directed=True)
-        is_up = parent[faces] == beyond
-        up[faces[is_up]] = both[is_up]
-    return up
 
 
 def _cycle(links: Ints, up: Longs, h: int) -> Ints:

@@ -7,6 +7,7 @@ times.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from geodesic_core.fields.path import EXACT, GeodesicPath
 from geodesic_core.fields.sources import component_of, disconnected
 from geodesic_core.kernels.mesh.half_edges import BOUNDARY, HEAD, LENGTH, NO_FACE, OPPOSITE, TAIL
 from geodesic_core.loops.covers import Cover, cover_of, require_two_sided
-from geodesic_core.loops.straighten import strip_around
+from geodesic_core.loops.straighten import portals_along
 from geodesic_core.mesh.surface_curve import SurfaceCurve, runs_as_wound
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -31,7 +32,7 @@ def paths_on_both_sides(
     obstacle: Longs,
     control: Control,
 ) -> tuple[GeodesicPath, GeodesicPath]:
-    """Return the shortest paths past an obstacle, given by its inner vertices: left and right of it.
+    """Return the shortest paths left and right of an obstacle, given by its inner vertices.
 
     Raises
     ------
@@ -47,14 +48,14 @@ def paths_on_both_sides(
         message = f"{source} and {target} are in different connected components"
         raise disconnected(mesh, message, source, target)
     line = _line_out(mesh, obstacle, [source, target])
-    cover = _crossed_over(mesh, line)
+    cover = _crossed_over(mesh, line, control)
     search, start = PathSearch(cover.mesh), cover.lifted(source, 0)
     paths = []
     for sheet in (0, 1):
         end = cover.lifted(target, sheet)
         if component_of(cover.mesh, start) != component_of(cover.mesh, end):
             raise NoPath(f"all paths from {source} to {target} pass on one side", "disconnected")
-        part = control.for_part(sheet, 2)
+        part = control.holding(cover.mesh.nbytes).for_part(sheet, 2)
         path = cover.lowered(search.find(start, end, part, explain=False))
         paths.append(GeodesicPath(**vars(path), error_bound=EXACT, steps=None))
     first, second = paths
@@ -70,12 +71,12 @@ def _turns(first: GeodesicPath, second: GeodesicPath, line: Longs, obstacle: int
     that path passes it on the side of the other path.
     """
     links = first.on_mesh().topology.links
-    strip = strip_around(first, second)
+    strip = portals_along(first, second.reversed(), closed=True)
     back = links[strip, OPPOSITE]
     turns = int(np.isin(strip, line).sum()) - int(np.isin(back, line).sum())
     for path, sign in ((first, -1), (second, 1)):
         if turns == 0 and path.on_mesh().topology.outer_vertex[obstacle] in path.located.vertices:
-            portals = strip_around(path)
+            portals = portals_along(path, closed=False)
             has_it_left = (links[portals, TAIL] == obstacle).any()
             turns = sign if has_it_left else -sign
     return turns
@@ -132,9 +133,9 @@ def _line_out(mesh: TriangleMesh, obstacle: Longs, ends: Sequence[SurfacePoint])
     size = len(topology.total_angle)
     corners = topology.inner_vertex[mesh.faces[[end.face_index for end in ends]]].reshape(-1)
 
-    def graph_of(half_edges: Longs, weights: Floats):  # type: ignore[no-untyped-def]
-        shape = (links[half_edges, TAIL], links[half_edges, HEAD])
-        graph = coo_array((weights[half_edges], shape), shape=(size, size)).tocsr()
+    def graph_of(half_edges: Longs, weights: Floats) -> Any:
+        ends = links[half_edges, TAIL], links[half_edges, HEAD]
+        graph = coo_array((weights[half_edges], ends), shape=(size, size)).tocsr()
         return graph.maximum(graph.T)
 
     everything = np.arange(len(links))
@@ -172,7 +173,7 @@ def _half_edges_between(links: Ints, vertices: Longs) -> Longs:
     return np.array(found, np.int64)
 
 
-def _crossed_over(mesh: TriangleMesh, line: Longs) -> Cover:
+def _crossed_over(mesh: TriangleMesh, line: Longs, control: Control) -> Cover:
     """Return the cover of two sheets that are joined crosswise along half-edges."""
     links = mesh.topology.links
     other = np.zeros(len(links), bool)
@@ -180,4 +181,4 @@ def _crossed_over(mesh: TriangleMesh, line: Longs) -> Cover:
     opposite = links[line, OPPOSITE]
     other[opposite[opposite >= 0]] = True
     across = np.stack([other, ~other]).astype(np.int64)
-    return cover_of(mesh, across, np.ones(len(links) // 3, bool))
+    return cover_of(mesh, across, np.ones(len(links) // 3, bool), control)

@@ -9,6 +9,7 @@ only so many sheets are within the bound; and what is found is the shortest loop
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats, Longs
 from geodesic_core.control import Control
@@ -27,7 +28,9 @@ from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import SEARCH_SLACK
 
 
-def shortest_loop_through(mesh: TriangleMesh, point: SurfacePoint, control: Control) -> SurfaceCurve:
+def shortest_loop_through(
+    mesh: TriangleMesh, point: SurfacePoint, control: Control
+) -> SurfaceCurve:
     """Return the shortest loop through a canonical point that does not shrink to a point.
 
     Raises
@@ -72,7 +75,6 @@ class _LoopSearch:
         across = ways + lengths
         self._limit = float(across[self.graph.word_of > 0].min(initial=np.inf))
         """Largest length of the loops that are looked for"""
-        self._is_found = False
 
     def run(self) -> tuple[Cover, DistanceField, int]:
         """Return a cover, the distances on it, and the sheet to which the loop leads."""
@@ -81,17 +83,19 @@ class _LoopSearch:
             cover = self._cover()
             sheets = range(1, len(self._kinds.words))
             targets = [cover.lifted(self._point, sheet) for sheet in sheets]
+            # What is within the limit on an edge is near both of its ends
             limit = self._limit * (1.0 + SEARCH_SLACK)
-            start = cover.lifted(self._point, 0)
-            field = _swept(cover.mesh, start, targets, limit, self._control)
+            start, reach = cover.lifted(self._point, 0), limit + float(self._lengths.max())
+            control = self._control.holding(cover.mesh.nbytes)
+            field = _swept(cover.mesh, start, targets, reach, control)
             lengths = [field.distance_at(target) for target in targets]
-            self._is_found = min(lengths) < np.inf
-            if self._is_found:
+            is_found = min(lengths) <= limit
+            if min(lengths) < np.inf:
                 self._limit = min(lengths)
             missing = self._missing(cover, field)
-            if not len(missing) and self._is_found:
+            if is_found and not len(missing):
                 return cover, field, 1 + int(np.argmin(lengths))
-            if not self._is_found:
+            if min(lengths) == np.inf:
                 self._limit *= 2.0
             self._add_around(missing.tolist())
 
@@ -111,16 +115,16 @@ class _LoopSearch:
             [[kinds.number(sheet + word, add=False) for word in words] for sheet in kinds.words]
         )
         reach = 0.5 * self._limit * (1.0 + SEARCH_SLACK)
-        kept = (self._nearest.reshape(-1, 3) <= reach).any(axis=1)
+        kept: NDArray[np.bool_] = np.any(self._nearest.reshape(-1, 3) <= reach, axis=1)
         kept[self._mesh.inner_face[self._point.face_index]] = True
-        return cover_of(self._mesh, self._across[:, self._words_out], kept)
+        return cover_of(self._mesh, self._across[:, self._words_out], kept, self._control)
 
     def _missing(self, cover: Cover, field: DistanceField) -> Longs:
         """Return the sheets that a loop within the limit may leave for one that is missing."""
         face_count = len(self._mesh.topology.links) // 3
         half_edges = (3 * cover.base_faces)[:, None] + np.arange(3)
         sheets = np.repeat(cover.copies // face_count, 3).reshape(-1, 3)
-        distances = np.minimum(field.distances[cover.mesh.faces], self._limit)
+        distances = field.distances[cover.mesh.faces]
         ways = distances + np.roll(distances, -1, axis=1) - self._lengths[half_edges]
         is_near = 0.5 * ways + self._nearest[half_edges] <= self._limit
         is_open = self._across[sheets, self._words_out[half_edges]] < 0

@@ -32,9 +32,13 @@ class _Line(NamedTuple):
     """(N, 3) weights in them"""
     ends: Floats
 
+    def part(self, first: int, end: int) -> "_Line":
+        """Return some of the segments."""
+        return _Line(self.faces[first:end], self.starts[first:end], self.ends[first:end])
+
     def turned(self, first: int) -> "_Line":
         """Return the segments of a closed curve that begins with another one."""
-        return _Line(*(np.roll(rows, -first, axis=0) for rows in self))
+        return _joined([self.part(first, len(self.faces)), self.part(0, first)])
 
     def strips(self, mesh: TriangleMesh) -> list[Strip]:
         """Return strips along the line: more than one where it passes from one sheet to another."""
@@ -46,9 +50,17 @@ class _Line(NamedTuple):
 
     def first_break(self, mesh: TriangleMesh) -> int | None:
         """Return the first segment of a closed curve that no strip joins to those before."""
-        again = _Line(*(np.concatenate([rows, rows[:1]]) for rows in self))
+        again = _joined([self, self.part(0, 1)])
         first = funnel.strip_along(mesh.topology, *again, 0)[1]
         return None if first == len(again.faces) else first % len(self.faces)
+
+
+def _joined(lines: Sequence[_Line]) -> _Line:
+    return _Line(
+        np.concatenate([line.faces for line in lines]),
+        np.concatenate([line.starts for line in lines]),
+        np.concatenate([line.ends for line in lines]),
+    )
 
 
 def straightened_curve(curve: SurfaceCurve, control: Control) -> SurfaceCurve:
@@ -221,12 +233,11 @@ def curve_through(
     return SurfaceCurve(mesh, outer, closed, length, located)
 
 
-def strip_around(first: SurfaceCurve, second: SurfaceCurve | None = None) -> Ints:
-    """Return the portals along a curve, or around the loop that leads back along another one."""
-    mesh = first.on_mesh()
-    curves = [first] if second is None else [first, second.reversed(), first]
+def portals_along(*curves: SurfaceCurve, closed: bool) -> Ints:
+    """Return the portals along curves, each of which begins where the one before ends.
+
+    If they are closed, also those around the point where they meet again.
+    """
     lines = [_Line(each._inner_faces, *each._segments()[1:]) for each in curves]
-    if second is not None:
-        lines[2] = _Line(*(rows[:1] for rows in lines[2]))
-    line = _Line(*(np.concatenate(rows) for rows in zip(*lines, strict=True)))
-    return line.strips(mesh)[0].portals
+    line = _joined([*lines, lines[0].part(0, 1)] if closed else lines)
+    return line.strips(curves[0].on_mesh())[0].portals

@@ -1,5 +1,7 @@
 """Surfaces of known shortest loops: flat tori, and two tori joined by a neck."""
 
+import itertools
+
 import numpy as np
 
 import geodesic_core as gc
@@ -48,10 +50,13 @@ def double_torus(around=24, across=16, rings=6):
     mirrored[:, 0] = 2 * (points[tip, 0] + 1.0) - points[:, 0]
     shares = np.arange(1, rings) / rings
     necks = [(1 - share) * points[ring] + share * mirrored[ring] for share in shares]
-    rows = [np.array(ring), *(2 * count + np.arange((rings - 1) * len(ring)).reshape(rings - 1, -1))]
+    rows = [
+        np.array(ring),
+        *(2 * count + np.arange((rings - 1) * len(ring)).reshape(rings - 1, -1)),
+    ]
     rows.append(count + np.array(ring))
     quads = []
-    for a, b in zip(rows[:-1], rows[1:], strict=True):
+    for a, b in itertools.pairwise(rows):
         c, d = np.roll(a, -1), np.roll(b, -1)
         quads += [np.stack([a, c, d], axis=1), np.stack([a, d, b], axis=1)]
     vertices = np.concatenate([points, mirrored, *necks])

@@ -135,10 +135,11 @@ def strip_along(
     while i + 1 < len(faces):
         f, g, corner = faces[i], faces[i + 1], corner_with(ends[i], 1.0)
         if f != g and corner >= 0:
-            degree = fan_size(topology, 3 * f + corner)
+            v = topology.links[3 * f + corner, TAIL]
+            degree = topology.first_corner[v + 1] - topology.first_corner[v]
             portals = with_room(portals, size, degree)
             first = angles_at_tail(topology, 3 * f + corner, starts[i])
-            h = half_edge_from(topology.links, g, topology.links[3 * f + corner, TAIL])
+            h = half_edge_from(topology.links, g, v)
             last = angles_at_tail(topology, h, ends[i + 1])
             right, right_angle = around_vertex(topology, f, corner, g, RIGHT, portals, size)
             left, left_angle = around_vertex(topology, f, corner, g, LEFT, portals, size)
@@ -161,13 +162,6 @@ def strip_along(
     ends_of = np.empty((2, 3))
     ends_of[0], ends_of[1] = starts[begin], ends[i]
     return Strip(portals[:size].copy(), np.array([faces[begin], faces[i]]), ends_of), i + 1
-
-
-@inlined
-def fan_size(topology: Topology, h: int) -> int:
-    """Number of faces at the tail of a half-edge."""
-    v = topology.links[h, TAIL]
-    return topology.first_corner[v + 1] - topology.first_corner[v]
 
 
 @inlined
@@ -486,18 +480,16 @@ def with_touched(string: String, straight: float) -> String:
         for side in (LEFT, RIGHT):
             end = 0 if side == LEFT else 2
             x, y = ends[i, end], ends[i, end + 1]
-            is_bend = portal < size and end == column and x == bx and y == by
-            if is_bend:
+            if portal < size and end == column and x == bx and y == by:
                 is_new = i == portal
             else:
-                is_new = is_between(ax, ay, bx, by, x, y, straight) and (
-                    i == 0 or ends[i - 1, end] != x or ends[i - 1, end + 1] != y
-                )
+                is_new = i == 0 or ends[i - 1, end] != x or ends[i - 1, end + 1] != y
+                is_new = is_new and is_between(ax, ay, bx, by, x, y, straight)
             if is_new:
                 bends[count], sides[count] = i, side
                 count += 1
-        is_bend = portal < size and i >= portal
-        if is_bend and (ends[i + 1, column] != bx or ends[i + 1, column + 1] != by):
+        is_left = ends[i + 1, column] != bx or ends[i + 1, column + 1] != by
+        if portal < size and i >= portal and is_left:
             ax, ay, k = bx, by, k + 1
     return String(ends, bends[:count], sides[:count], string.length)
 
@@ -597,17 +589,9 @@ def points_of(strip: Strip, string: String) -> tuple[Longs, Floats]:
 
 @inlined
 def share_crossed(
-    ax: float,
-    ay: float,
-    bx: float,
-    by: float,
-    x: float,
-    y: float,
-    lx: float,
-    ly: float,
-    rx: float,
+    ax: float, ay: float, bx: float, by: float, x: float, y: float, lx: float, ly: float, rx: float,
     ry: float,
-) -> float:
+) -> float:  # fmt: skip
     """Share of the portal from l to r at which the line from a to b crosses it.
 
     Of a portal along the line it is the point nearest to (x, y), which the line has come to.

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.kernels.paths import funnel
 from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL
+from geodesic_core.kernels.paths import funnel
 from geodesic_core.kernels.paths.funnel import (
     LEFT,
     RIGHT,
@@ -119,9 +119,8 @@ def line_along(mesh, vertices):
     """Faces and weights of segments between neighbours, in an order that kernels take."""
     faces, starts, ends = [], [], []
     for v, u in itertools.pairwise(inner(mesh, vertices).tolist()):
-        for face, corners in enumerate(mesh.topology.links[:, TAIL].reshape(-1, 3).tolist()):
-            if v in corners and u in corners:
-                break
+        each = enumerate(mesh.topology.links[:, TAIL].reshape(-1, 3).tolist())
+        face, corners = next(pair for pair in each if v in pair[1] and u in pair[1])
         faces.append(face)
         starts.append(np.eye(3)[corners.index(v)])
         ends.append(np.eye(3)[corners.index(u)])
@@ -261,7 +260,7 @@ def test_straight_is_the_least_turn_that_is_taken_out(scale, share, passes, side
     """A string bends around the middle of a flat kite, whose other side is a little shorter."""
     turn = share * STRAIGHT
     mesh = flat_kite(turn if side == RIGHT else -turn, scale)
-    strip, v = strip_beside(mesh, side)
+    strip, _ = strip_beside(mesh, side)
     strip, string, _ = straightened(mesh.topology, strip, STRAIGHT, STRAIGHT, PASSES)
     bent = 2.0 / math.cos(turn / 2)
     assert string.length == pytest.approx((2.0 if passes else bent) * scale, rel=1e-14)

@@ -31,7 +31,12 @@ def test_a_torus_has_a_belt_and_the_rim_of_its_hole():
     [
         (lambda: glued.double_torus()[0], 2),
         (lambda: gc.samples.knot(2000), 1),
-        (lambda: gc.TriangleMesh(zoo.SMALL["double_frame"].vertices, zoo.SMALL["double_frame"].faces), 2),
+        (
+            lambda: gc.TriangleMesh(
+                zoo.SMALL["double_frame"].vertices, zoo.SMALL["double_frame"].faces
+            ),
+            2,
+        ),
         (lambda: gc.TriangleMesh(*zoo.joined(zoo.torus(12, 8), zoo.torus(9, 7))), 2),
     ],
     ids=["two tori joined", "knot", "frame", "two tori apart"],

@@ -1,5 +1,6 @@
 """The shortest path on each side of an obstacle, against the plane's taut strings."""
 
+import itertools
 import math
 
 import numpy as np
@@ -17,7 +18,7 @@ HOLE = (4, 4, 7, 6)
 
 
 def taut(*places):
-    return sum(math.dist(a, b) for a, b in zip(places[:-1], places[1:], strict=True))
+    return sum(math.dist(a, b) for a, b in itertools.pairwise(places))
 
 
 def sides(mesh, a, b, obstacle, **options):

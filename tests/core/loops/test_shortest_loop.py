@@ -91,7 +91,9 @@ def test_of_two_holes_the_nearer():
     x, y = points[faces].mean(axis=1)[:, :2].T
     is_in = ((x > 3) & (x < 5) | (x > 10) & (x < 13)) & (y > 3) & (y < 5)
     mesh = gc.TriangleMesh(points, faces[~is_in])
-    holes = [np.array([(a, b) for a in xs for b in (3.0, 5.0)]) for xs in ((3.0, 5.0), (10.0, 13.0))]
+    holes = [
+        np.array([(a, b) for a in xs for b in (3.0, 5.0)]) for xs in ((3.0, 5.0), (10.0, 13.0))
+    ]
     for place in ((0, 0), (7, 4), (8, 4), (16, 8)):
         loop = gc.shortest_loop(mesh, glued.at(mesh, *place))
         around = [hull_length(np.vstack([hole, [place]])) for hole in holes]
@@ -144,4 +146,3 @@ def test_nasty_meshes_have_a_loop_or_a_typed_error(case):
             field = gc.exact_distance(mesh, point)
             there = min(field.distance_at(place) for place in other.locations)
             assert loop.length <= (2 * there + other.length) * (1 + 1e-9)
-
