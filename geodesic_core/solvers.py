@@ -893,7 +893,10 @@ def shortest_loop(
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     surface, control = _surface_of(mesh, barriers, control)
-    return shortest_loop_through(surface, surface.point(through, "through"), control)
+    quiet = replace(control, progress=None)  # how many sweeps it takes is not known
+    loop = shortest_loop_through(surface, surface.point(through, "through"), quiet)
+    control.checkpoint(1.0)
+    return loop
 
 
 def handle_loops(
@@ -946,7 +949,9 @@ def handle_loops(
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     surface, control = _surface_of(mesh, barriers, control)
-    return handle_loops_of(surface, control)
+    loops = handle_loops_of(surface, replace(control, progress=None))
+    control.checkpoint(1.0)
+    return loops
 
 
 def paths_around(
@@ -1016,7 +1021,9 @@ def paths_around(
         surface, control = with_barriers(surface, place, control)
         place = None
     ends = surface.point(source, "source"), surface.point(target, "target")
-    return paths_on_both_sides(surface, *ends, obstacle_of(surface, wide, place), control)
+    paths = paths_on_both_sides(surface, *ends, obstacle_of(surface, wide, place), control)
+    control.checkpoint(1.0)
+    return paths
 
 
 class Solver:
