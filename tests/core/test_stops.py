@@ -64,8 +64,6 @@ SWEEPS |= {
     "log map": lambda m, **watch: gc.log_map(m, INSIDE, x_axis=7, **watch),
     "cut": lambda m, **watch: gc.cut(m, crossing_chords(), **watch),
     "sides": lambda m, **watch: gc.paths_around(m, 0, 2000, 1000, **watch),
-    "handles": lambda m, **watch: gc.handle_loops(m, **watch),
-    "loop": lambda m, **watch: gc.shortest_loop(m, 2000, barriers=[0, 4000], **watch),
     "lines": lambda m, **watch: gc.trace(m, MANY, np.arange(10.0), 300.0, **watch),
 }
 SEARCHES = {
