@@ -35,6 +35,10 @@ from geodesic_core.fields.sweep_result import Retain
 from geodesic_core.fields.sweeps import ExactSweep
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
 from geodesic_core.kernels.jit.cache import sources_digest
+from geodesic_core.loops.handle_loops import handle_loops_of
+from geodesic_core.loops.paths_around import obstacle_of, paths_on_both_sides
+from geodesic_core.loops.shortest_loop import shortest_loop_through
+from geodesic_core.loops.straighten import straightened_curve
 from geodesic_core.matrices.matrix import Layout, find_matrix
 from geodesic_core.mesh.barriers import with_barriers
 from geodesic_core.mesh.canonical import each_of
@@ -1018,6 +1022,235 @@ def mean_point(
     return find_mean(surface, places, shares / shares.sum(), control)
 
 
+def straighten(curve: SurfaceCurve) -> SurfaceCurve:
+    """Return a curve pulled tight: the shortest of those into which it can be moved, near it.
+
+    Its ends stay. It is straight but for bends at vertices and at the boundary, where neither side
+    leaves it less than half a turn. So it is shorter than all curves near it; another one may be
+    shorter that lies beyond a hill.
+
+    Parameters
+    ----------
+    curve
+        A path, a straight line, a line of equal value, a border, a boundary or a loop.
+
+    Returns
+    -------
+    SurfaceCurve
+        Never longer, rounding aside; closed if the curve is. Its bends are vertices, exactly. It
+        stays off barriers of the curve's mesh. Where more than two faces meet at an edge, or the
+        faces of a vertex form several fans, it passes where the curve does; so it does where a
+        one-sided surface is joined to its other side.
+
+    Raises
+    ------
+    NoLoop
+        The curve is closed, and shrinks to a point.
+    InvalidArgument
+        The curve was resampled, or is a copy without its mesh.
+
+    Notes
+    -----
+    O(faces crossed) for each vertex that the curve moves past; 500 faces take about a millisecond.
+
+    Examples
+    --------
+    >>> mesh = gc.samples.plane(200)  # the unit square
+    >>> bent = gc.shortest_path(mesh, 0, 120, waypoints=[10])
+    >>> round(bent.length, 6), round(gc.straighten(bent).length, 6)
+    (2.0, 1.414214)
+    """
+    return straightened_curve(curve, Control())
+
+
+def shortest_loop(
+    mesh: MeshLike | Solver,
+    through: Point,
+    *,
+    barriers: Iterable[int] = (),
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> SurfaceCurve:
+    """Return the shortest closed curve through a point that cannot be shrunk to a point.
+
+    It runs around a hole or a handle, or between parts of the surface each of which has one.
+
+    Parameters
+    ----------
+    mesh
+        The surface: a `TriangleMesh`, anything else that `as_mesh` takes, or a `Solver`.
+    through
+        A vertex index or a `SurfacePoint`.
+    barriers
+        As in `exact_distance`: faces that count as holes.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
+
+    Returns
+    -------
+    SurfaceCurve
+        It begins at the point; the shortest of all, not only of those near it. `straighten` takes
+        the bend out that it may have there.
+
+    Raises
+    ------
+    NoLoop
+        On this part of the surface every loop shrinks to a point.
+    InvalidMesh
+        The mesh is no surface with two sides.
+    InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `exact_distance`.
+
+    Notes
+    -----
+    Exact sweeps over the universal cover, up to the length of the loop: of copies of the surface,
+    as many as lie that near. It takes some ten sweeps where there is one handle, more where there
+    are many.
+
+    Examples
+    --------
+    >>> plate = gc.samples.obstacles(2000)  # with holes
+    >>> loop = gc.shortest_loop(plate, through=0)
+    >>> loop.closed, round(loop.length, 3)
+    (True, 4.946)
+    """
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    surface, control = _surface_of(mesh, barriers, control)
+    quiet = replace(control, progress=None)  # how many sweeps it takes is not known
+    loop = shortest_loop_through(surface, surface.point(through, "through"), quiet)
+    control.checkpoint(1.0)
+    return loop
+
+
+def handle_loops(
+    mesh: MeshLike | Solver,
+    *,
+    barriers: Iterable[int] = (),
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> list[SurfaceCurve]:
+    """Return two loops for each handle of a surface, such as one around it and one along it.
+
+    Cut along all of them, no handle is left. None of them can be moved into others, nor into what
+    these make up together. Which of the two goes around the handle and which along it is a question
+    of the space around the surface, and not told.
+
+    Parameters
+    ----------
+    mesh
+        The surface: a `TriangleMesh`, anything else that `as_mesh` takes, or a `Solver`.
+    barriers
+        As in `exact_distance`. Holes are no handles.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
+
+    Returns
+    -------
+    list of SurfaceCurve
+        Closed, as short as those near them; the shortest first. Empty where there is no handle.
+
+    Raises
+    ------
+    InvalidMesh
+        The mesh is no surface with two sides.
+    InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `exact_distance`.
+
+    Notes
+    -----
+    A few exact sweeps.
+
+    Examples
+    --------
+    >>> knot = gc.samples.knot(2000)
+    >>> [round(loop.length, 1) for loop in gc.handle_loops(knot)]
+    [2.8, 25.7]
+    >>> gc.handle_loops(gc.samples.sphere(320))
+    []
+    """
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    surface, control = _surface_of(mesh, barriers, control)
+    loops = handle_loops_of(surface, replace(control, progress=None))
+    control.checkpoint(1.0)
+    return loops
+
+
+def paths_around(
+    mesh: MeshLike | Solver,
+    source: Point,
+    target: Point,
+    obstacle: Point | SurfaceCurve | Iterable[int],
+    *,
+    barriers: Iterable[int] = (),
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> tuple[GeodesicPath, GeodesicPath]:
+    """Return the shortest path on each side of an obstacle: left of it, and right.
+
+    The sides are told by the shortest line of edges from the obstacle to the outside: the longest
+    other boundary, or where there is none the vertex farthest from all three. Of the paths that
+    cross it an even number of times, and of those that cross it an odd number, the shortest is
+    returned. Each is exact, among all such paths, and may pass other holes on any side.
+
+    Parameters
+    ----------
+    mesh
+        The surface: a `TriangleMesh`, anything else that `as_mesh` takes, or a `Solver`.
+    source, target
+        Vertex indices or `SurfacePoint`.
+    obstacle
+        A hole, as a curve of `TriangleMesh.boundaries`; a barrier, as the ids of its faces, which
+        are to be connected; or a vertex, on which the paths may touch.
+    barriers
+        As in `exact_distance`: further faces that count as holes.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
+
+    Returns
+    -------
+    tuple of GeodesicPath
+        The path that has the obstacle on its right, and the one that has it on its left.
+
+    Raises
+    ------
+    NoPath
+        The points are not connected, or on one side of the obstacle only.
+    InvalidMesh
+        The mesh is no surface with two sides.
+    InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `shortest_path`.
+
+    Notes
+    -----
+    Two searches as that of `shortest_path`, on a mesh of twice as many faces.
+
+    Examples
+    --------
+    >>> mesh = gc.samples.plane(200)  # the unit square
+    >>> left, right = gc.paths_around(mesh, 55, 65, obstacle=range(86, 94))
+    >>> round(left.length, 3), round(right.length, 3)
+    (1.086, 1.086)
+    """
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    surface, control = _surface_of(mesh, barriers, control)
+    wide, place = surface, unboxed(obstacle)
+    if isinstance(place, SurfacePoint) or is_index(place):
+        place = surface.point(place, "obstacle")
+    elif not isinstance(place, SurfaceCurve):
+        surface, control = with_barriers(surface, place, control)
+        place = None
+    ends = surface.point(source, "source"), surface.point(target, "target")
+    paths = paths_on_both_sides(surface, *ends, obstacle_of(surface, wide, place), control)
+    control.checkpoint(1.0)
+    return paths
+
+
 class Solver:
     """Solvers of one mesh that reuse memory and landmarks from call to call.
 
@@ -1073,6 +1306,9 @@ class Solver:
     farthest_points = farthest_points
     relax_points = relax_points
     mean_point = mean_point
+    shortest_loop = shortest_loop
+    handle_loops = handle_loops
+    paths_around = paths_around
 
 
 def _surface_of(

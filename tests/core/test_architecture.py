@@ -13,6 +13,7 @@ PARTS = [
     "solvers",
     "matrices",
     "sampling",
+    "loops",
     "cutting",
     "search",
     "fields",

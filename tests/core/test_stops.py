@@ -66,6 +66,7 @@ SWEEPS |= {
     "farthest points": lambda m, **watch: gc.farthest_points(m, 60, **watch).distances,
     "relaxed": lambda m, **watch: gc.relax_points(m, [INSIDE, 5, 900], 3, **watch).costs,
     "mean": lambda m, **watch: gc.mean_point(m, [INSIDE, 5, 900], **watch),
+    "sides": lambda m, **watch: gc.paths_around(m, 0, 2000, 1000, **watch),
     "lines": lambda m, **watch: gc.trace(m, MANY, np.arange(10.0), 300.0, **watch),
 }
 SEARCHES = {
