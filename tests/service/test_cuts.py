@@ -259,26 +259,33 @@ def test_other_formats_and_links(client: TestClient, terrain: str) -> None:
     check_problem(ask(client, "0" * 32, "cut", curves=[CURVE]), 404, "mesh_not_found")
 
 
-def test_limits_of_a_cut(tmp_path: Path) -> None:
-    with serving(tmp_path, max_faces=300, store_bytes=400_000) as client:
-        mesh_id = upload_sample(client, "plane", 200)
-        path = ask(client, mesh_id, "path", source=0, target=119).json()["locations"]
-        others = [ask(client, mesh_id, "path", source=i, target=115).json() for i in range(10)]
-        many = ask(client, mesh_id, "cut", curves=as_curves(*others))
-        problem = check_problem(many, 422, "limit_exceeded")
-        assert (problem["limit"], problem["setting"]) == (300, "max_faces")
-        assert problem["actual"] > 300
-        for k in range(2, len(path)):
-            cut = ask(client, mesh_id, "cut", curves=[{"polyline": path[:k]}])
-            if cut.status_code != 201:
-                break
-        check_problem(cut, 507, "storage_full")
-
-
-def test_a_cut_stops_at_its_deadline(client: TestClient) -> None:
-    mesh_id = upload_sample(client, "sphere", 100_000)
-    body = {"curves": [{"polyline": [0]}]}
-    link = f"/v1/meshes/{mesh_id}/cut"
-    late = client.post(link, json=body, headers={"X-Timeout-Ms": "1"})
-    check_problem(late, 504, "deadline_exceeded")
-    assert [each["id"] for each in client.get("/v1/meshes").json()["meshes"]].count(mesh_id) == 1
+@pytest.mark.parametrize(
+    ("settings", "headers", "status", "code"),
+    [
+        ({"max_faces": 2000}, {}, 422, "limit_exceeded"),
+        ({"max_vertices": 1100}, {}, 422, "limit_exceeded"),
+        ({"query_memory_bytes": 2**17}, {}, 422, "memory_limit"),
+        ({"store_bytes": 1_000_000}, {}, 507, "storage_full"),
+        ({"deadline_s": 60}, {"X-Timeout-Ms": "1"}, 504, "deadline_exceeded"),
+    ],
+)
+def test_a_cut_beyond_a_limit_leaves_nothing(
+    tmp_path: Path, settings: Any, headers: Any, status: int, code: str
+) -> None:
+    with serving(tmp_path, **settings) as client:
+        mesh_id = upload_sample(client, "plane", 1900)
+        before = client.get("/v1/meshes").json()
+        x = stored_mesh(client, mesh_id).vertices[:, 0].tolist()
+        body = {"values": x, "count": 40, "include": ["locations"]}
+        levels = ask(client, mesh_id, "isolines", **body).json()["isolines"]
+        curves = as_curves(*(line for each in levels for line in each["lines"]))
+        link = f"/v1/meshes/{mesh_id}/cut"
+        refused = client.post(link, json={"curves": curves}, headers=headers)
+        problem = check_problem(refused, status, code)
+        if status != 504:
+            (setting,) = settings
+            assert (problem["limit"], problem["setting"]) == (settings[setting], setting)
+            assert problem["actual"] > problem["limit"]
+        assert client.get("/v1/meshes").json() == before
+        folders = tmp_path / "meshes", tmp_path / "tmp"
+        wait_until(lambda: [path.name for each in folders for path in each.iterdir()] == [mesh_id])
