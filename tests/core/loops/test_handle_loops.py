@@ -7,8 +7,6 @@ import geodesic_core as gc
 from tests.support import glued, zoo
 from tests.support.straightness import worst_bend
 
-pytestmark = pytest.mark.jit
-
 
 def test_a_flat_torus_has_its_two_shortest_lattice_vectors():
     mesh = glued.flat_torus(9, 7, (3.0, 0.0), (0.7, 2.0))
@@ -25,6 +23,7 @@ def test_a_torus_has_a_belt_and_the_rim_of_its_hole():
     assert worst_bend(rim) < 1e-6
 
 
+@pytest.mark.jit
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("make", "handles"),

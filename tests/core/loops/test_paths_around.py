@@ -12,7 +12,6 @@ from tests.support import glued, zoo
 from tests.support.meshes import mesh_of, random_points
 from tests.support.straightness import worst_bend
 
-pytestmark = pytest.mark.jit
 
 HOLE = (4, 4, 7, 6)
 
@@ -105,6 +104,7 @@ def test_obstacles_that_are_refused():
         gc.paths_around(apart, 0, 20, 5)
 
 
+@pytest.mark.jit
 @pytest.mark.slow
 @zoo.each({**zoo.SMALL, **zoo.IRREGULAR})
 def test_nasty_meshes_have_paths_or_a_typed_error(case):

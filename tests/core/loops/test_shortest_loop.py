@@ -10,8 +10,6 @@ from geodesic_core.errors import InvalidMesh, NoLoop
 from tests.support import glued, zoo
 from tests.support.meshes import mesh_of, random_points
 
-pytestmark = pytest.mark.jit
-
 
 def check_through(loop, point):
     mesh = loop.on_mesh()
@@ -45,6 +43,7 @@ def test_a_neck_between_two_tori():
     assert gc.straighten(loop).length == pytest.approx(girth, rel=1e-12)
 
 
+@pytest.mark.jit
 @pytest.mark.slow
 def test_no_loop_through_a_vertex_of_two_tori_is_shorter():
     """Handles as well: candidates are loops of handles, and their sums with ways there and back."""
@@ -85,6 +84,7 @@ def hull_length(points):
         hull.append(following)
 
 
+@pytest.mark.jit
 @pytest.mark.slow
 def test_of_two_holes_the_nearer():
     points, faces = zoo.grid(16, 8)
@@ -131,6 +131,7 @@ def test_no_surface_with_two_sides(name):
             ask()
 
 
+@pytest.mark.jit
 @pytest.mark.slow
 @zoo.each({**zoo.SMALL, **zoo.KNOWN, **zoo.IRREGULAR})
 def test_nasty_meshes_have_a_loop_or_a_typed_error(case):
