@@ -12,7 +12,6 @@ from tests.support import glued, zoo
 from tests.support.meshes import mesh_of, random_points
 from tests.support.straightness import worst_bend
 
-
 HOLE = (4, 4, 7, 6)
 
 
