@@ -14,6 +14,7 @@ def test_a_flat_torus_has_its_two_shortest_lattice_vectors():
     assert lengths == pytest.approx([np.hypot(0.7, 2.0), 3.0], rel=1e-12)
 
 
+@pytest.mark.jit
 def test_a_torus_has_a_belt_and_the_rim_of_its_hole():
     mesh = gc.TriangleMesh(*zoo.torus(60, 40))
     belt, rim = gc.handle_loops(mesh)

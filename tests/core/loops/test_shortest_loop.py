@@ -100,6 +100,7 @@ def test_of_two_holes_the_nearer():
         assert loop.length == pytest.approx(min(around), rel=1e-12)
 
 
+@pytest.mark.jit
 def test_the_tube_of_the_knot():
     knot = gc.samples.knot(3000)
     tube = gc.handle_loops(knot)[0]
