@@ -19,6 +19,7 @@ from geodesic_core.control import Control
 from geodesic_core.cutting.cut_mesh import CutMesh
 from geodesic_core.errors import GeodesicError
 from geodesic_core.fields.borders import Border
+from geodesic_core.fields.cells import Cells
 from geodesic_core.fields.distance_field import DistanceField
 from geodesic_core.fields.isolines import resolve_chord_error, spaced_levels
 from geodesic_core.fields.log_map import LogMap, Polar
@@ -39,6 +40,9 @@ from geodesic_core.mesh.surface_curve import SurfaceCurve
 from geodesic_core.mesh.surface_point import Curve, Source, SurfacePoint
 from geodesic_core.mesh.tangent_frames import TangentFrames
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.sampling.farthest_points import FarthestPoints
+from geodesic_core.sampling.mean_point import MeanPoint
+from geodesic_core.sampling.relaxation import RelaxedPoints
 from geodesic_core.search.nearest import Nearest
 from geodesic_core.solvers import (
     Solver,
@@ -47,11 +51,18 @@ from geodesic_core.solvers import (
     distance_matrix,
     error_bound,
     exact_distance,
+    farthest_points,
     fast_distance,
+    handle_loops,
     kernel_digest,
     log_map,
+    mean_point,
     nearest,
+    paths_around,
+    relax_points,
+    shortest_loop,
     shortest_path,
+    straighten,
     trace,
 )
 from geodesic_core.tolerances import WEIGHT_ERROR
@@ -59,19 +70,23 @@ from geodesic_core.tolerances import WEIGHT_ERROR
 __all__ = [
     "WEIGHT_ERROR",
     "Border",
+    "Cells",
     "Control",
     "Curve",
     "CutMesh",
     "DistanceField",
     "ErrorBound",
+    "FarthestPoints",
     "GeodesicError",
     "GeodesicPath",
     "LogMap",
     "MatrixFile",
     "MatrixParts",
+    "MeanPoint",
     "MeshReport",
     "Nearest",
     "Polar",
+    "RelaxedPoints",
     "Retain",
     "Sample",
     "ScalarField",
@@ -92,19 +107,26 @@ __all__ = [
     "error_bound",
     "errors",
     "exact_distance",
+    "farthest_points",
     "fast_distance",
+    "handle_loops",
     "kernel_digest",
     "load_field",
     "load_label",
     "load_label_vertices",
     "load_mesh",
     "log_map",
+    "mean_point",
     "nearest",
+    "paths_around",
+    "relax_points",
     "resolve_chord_error",
     "samples",
     "share_a_face",
+    "shortest_loop",
     "shortest_path",
     "spaced_levels",
+    "straighten",
     "trace",
     "walled_in",
     "warm_up",

@@ -1,4 +1,4 @@
-"""Array types, and rows that are aligned to cache lines."""
+"""Array types, rows that are aligned to cache lines, and sums by group."""
 
 from typing import Any, TypeAlias
 
@@ -28,3 +28,9 @@ def aligned_rows(count: int, width: int, dtype: Any) -> Any:
     memory = np.empty(size + CACHE_LINE, np.uint8)
     begin = -memory.ctypes.data % CACHE_LINE
     return memory[begin : begin + size].view(dtype).reshape(count, width)
+
+
+def sums_by(groups: NDArray[Any], values: Floats, count: int) -> Floats:
+    """Return the sum of the values of each of so many groups, (count,)."""
+    sums: Floats = np.bincount(groups, values, minlength=count).astype(np.float64)
+    return sums

@@ -27,7 +27,10 @@ from geodesic_core.solvers import (
     cut,
     exact_distance,
     fast_distance,
+    handle_loops,
     log_map,
+    shortest_path,
+    straighten,
 )
 from geodesic_core.validation import check_choice
 
@@ -105,6 +108,11 @@ def _cuts() -> None:
     cut(mesh, _curve(mesh))
 
 
+def _loops() -> None:
+    straighten(shortest_path(_mesh(), 0, 8))
+    handle_loops(samples.knot(500))
+
+
 WORKLOADS: dict[str, Callable[[], None]] = {
     "exact": _exact,
     "approximate": _approximate,
@@ -117,6 +125,7 @@ WORKLOADS: dict[str, Callable[[], None]] = {
     "paths": _paths,
     "maps": _maps,
     "cuts": _cuts,
+    "loops": _loops,
 }
 """Calls that together use all kernels, in an order that suits two processes.
 
@@ -135,7 +144,7 @@ def compile_kernels(
     workloads
         Kinds of calls to compile for: ``"exact"``, ``"approximate"``, ``"paths"``, ``"curves"``,
         ``"approximate-curves"``, ``"fast"``, ``"fast-curves"``, ``"isolines"``, ``"borders"``,
-        ``"maps"`` and ``"cuts"``; None for all.
+        ``"maps"``, ``"cuts"`` and ``"loops"``; None for all.
     cancel
         Called before compilation begins and then ten times a second; compilation ends once it
         returns True. Not called where no kernel is missing.

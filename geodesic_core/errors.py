@@ -12,6 +12,7 @@ They form a tree::
     │   └── NoTangentPlane      a point of the mesh where directions have no meaning
     ├── InvalidArgument         any other argument out of its domain
     │   ├── NoDirection         a vector that has no direction on the surface
+    │   ├── NoLoop              loops asked for where every one shrinks to a point
     │   └── NotEmbedded         what needs space, asked of a mesh given by the lengths of its edges
     ├── NoPath                  not connected, or farther than a limit (``reason``)
     ├── Cancelled               the caller asked the sweep to stop
@@ -243,6 +244,20 @@ class NoDirection(InvalidArgument):
     def __init__(self, message: str, index: int = 0) -> None:
         super().__init__(message)
         self.index = index
+
+
+class NoLoop(InvalidArgument):
+    """A closed curve that shrinks to a point, or a surface on which every one does.
+
+    Examples
+    --------
+    >>> sphere = gc.samples.sphere(320)
+    >>> try:
+    ...     gc.shortest_loop(sphere, 0)
+    ... except gc.errors.NoLoop as error:
+    ...     print(error)
+    every loop on this part of the surface shrinks to a point
+    """
 
 
 class NotEmbedded(InvalidArgument):

@@ -5,6 +5,7 @@ Each is a function of a mesh or of a `Solver`, and the method of the same name.
 
 from __future__ import annotations  # help() shows the names of types, not what they stand for
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -23,7 +24,7 @@ from geodesic_core.fields.log_map import LogMap, log_map_of
 from geodesic_core.fields.methods import Effort, Method, promise_of, sweep_of
 from geodesic_core.fields.path import ErrorBound, GeodesicPath, joined
 from geodesic_core.fields.question import Question
-from geodesic_core.fields.sources import component_of, disconnected, each_of
+from geodesic_core.fields.sources import as_points, component_of, disconnected
 from geodesic_core.fields.straight_lines import (
     StraightLine,
     as_lengths,
@@ -34,16 +35,31 @@ from geodesic_core.fields.sweep_result import Retain
 from geodesic_core.fields.sweeps import ExactSweep
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
 from geodesic_core.kernels.jit.cache import sources_digest
+from geodesic_core.loops.handle_loops import handle_loops_of
+from geodesic_core.loops.paths_around import obstacle_of, paths_on_both_sides
+from geodesic_core.loops.shortest_loop import shortest_loop_through
+from geodesic_core.loops.straighten import straightened_curve
 from geodesic_core.matrices.matrix import Layout, find_matrix
 from geodesic_core.mesh.barriers import with_barriers
+from geodesic_core.mesh.canonical import each_of
 from geodesic_core.mesh.surface_curve import Sources, SurfaceCurve, length_of
 from geodesic_core.mesh.surface_point import Curve, Point, Points, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.sampling.farthest_points import FarthestPoints, spread_points
+from geodesic_core.sampling.mean_point import MeanPoint, find_mean
+from geodesic_core.sampling.relaxation import RelaxedPoints, relaxed_points
 from geodesic_core.search.nearest import Nearest, find_nearest
 from geodesic_core.search.path_search import PathSearch
 from geodesic_core.search.workspace import Workspace
 from geodesic_core.tolerances import AT_LIMIT
-from geodesic_core.validation import as_limit, check_choice, is_index, unboxed
+from geodesic_core.validation import (
+    as_limit,
+    as_nonnegative,
+    check_choice,
+    is_index,
+    is_number,
+    unboxed,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -793,6 +809,448 @@ def cut(
     return cut_along(surface, lines, control, separate=separate)
 
 
+def farthest_points(
+    mesh: MeshLike | Solver,
+    count: int | None = None,
+    radius: float | None = None,
+    start: Points = 0,
+    barriers: Iterable[int] = (),
+    *,
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> FarthestPoints:
+    """Return points spread over the surface: each the vertex farthest from those before it.
+
+    Parameters
+    ----------
+    mesh
+        The surface: a `TriangleMesh`, anything else that `as_mesh` takes, or a `Solver`.
+    count
+        Number of points, those of ``start`` included.
+    radius
+        Covering radius to reach, mesh units. At least one of the two must be given; the first that
+        is reached ends the call.
+    start
+        The points to begin with: a vertex index or a `SurfacePoint`, or several.
+    barriers
+        As in `exact_distance`.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
+
+    Returns
+    -------
+    FarthestPoints
+        The points, the covering radius after each, and exact distances from the nearest one. Of
+        vertices that are equally far, the lowest comes first. Each part of the surface gets a
+        point.
+
+    Raises
+    ------
+    InvalidArgument
+        Neither is given, one is out of its domain, or the mesh has fewer points than ``count``.
+    InvalidPoint
+        A start is not on the mesh, or lies inside a barrier.
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `exact_distance`.
+
+    Notes
+    -----
+    One sweep over all of the mesh, and for each further point one over the part that is nearer to
+    it, plus O(V): some 6 sweeps for 1,000 points of a mesh with 100,000 faces.
+
+    Examples
+    --------
+    >>> mesh = gc.samples.plane(200)  # the unit square
+    >>> samples = gc.farthest_points(mesh, 5, start=0)
+    >>> mesh.vertices[samples.vertices, :2].tolist()
+    [[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.5]]
+    >>> samples.radius.round(3).tolist()
+    [1.414, 1.0, 1.0, 0.707, 0.5]
+    """
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    if count is None and radius is None:
+        raise InvalidArgument("neither count nor radius is given: how many points shall there be?")
+    if count is not None and not (is_index(count) and count > 0):
+        raise InvalidArgument(f"count is {count!r}; it must be a whole number above 0")
+    if radius is not None and not (is_number(radius) and radius >= 0.0):
+        raise InvalidArgument(f"radius is {radius!r}; it must be a number, 0 or more")
+    surface, control = _surface_of(mesh, barriers, control)
+    points = as_points(surface, start, "start", control)
+    question = Question.of(surface, points, (), math.inf, control)
+    most, least = math.inf if count is None else count, -1.0 if radius is None else radius
+    return spread_points(question, most, least, control)
+
+
+def relax_points(
+    mesh: MeshLike | Solver,
+    points: Points,
+    iterations: int = 20,
+    density: ArrayLike | None = None,
+    barriers: Iterable[int] = (),
+    *,
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> RelaxedPoints:
+    """Return points spread evenly, by Lloyd's method: each in the middle of its own cell.
+
+    In each iteration every point moves straight to the centroid of what is nearest to it, in its
+    log map; by less, where the sum of squared distances would rise.
+
+    Parameters
+    ----------
+    mesh
+        The surface: a `TriangleMesh`, anything else that `as_mesh` takes, or a `Solver`.
+    points
+        Where they begin: one or more vertex indices or `SurfacePoint`; `farthest_points` finds good
+        ones.
+    iterations
+        How often they move, at most; fewer if they converge.
+    density
+        (V,) numbers, 0 or more, at the vertices: where it is high, points come to lie closer. None
+        for the same everywhere.
+    barriers
+        As in `exact_distance`.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
+
+    Returns
+    -------
+    RelaxedPoints
+        The points, and the cost after each iteration, which never rises.
+
+    Raises
+    ------
+    NoTangentPlane
+        A point has none, as in `log_map`.
+    InvalidPoint
+        A point is not on the mesh.
+    InvalidArgument
+        Another argument is out of its domain.
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `exact_distance`.
+
+    Notes
+    -----
+    A sweep for each iteration, and one more for each time that a move is halved. Distances are
+    exact. The surface counts at its vertices, by a third of the area of their faces: so cells
+    should have many vertices.
+
+    Examples
+    --------
+    >>> mesh = gc.samples.plane(2000)  # the unit square
+    >>> relaxed = gc.relax_points(mesh, gc.farthest_points(mesh, 5).points)
+    >>> bool(relaxed.costs[-1] < relaxed.costs[0])
+    True
+    """
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    if not (is_index(iterations) and iterations >= 0):
+        raise InvalidArgument(f"iterations is {iterations!r}; it must be a whole number, 0 or more")
+    surface, control = _surface_of(mesh, barriers, control)
+    starts = tuple(as_points(surface, points, "point", control))
+    mass = as_nonnegative("density", 1.0 if density is None else density, len(surface.vertices))
+    return relaxed_points(surface, starts, iterations, mass, control)
+
+
+def mean_point(
+    mesh: MeshLike | Solver,
+    points: Points,
+    weights: ArrayLike | None = None,
+    barriers: Iterable[int] = (),
+    *,
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> MeanPoint:
+    """Return the mean of points on a surface: where squared distances from them sum to the least.
+
+    It is also called their Karcher or Fréchet mean. The search begins at the best vertex, so that
+    it seldom ends in a place that is only better than all around it.
+
+    Parameters
+    ----------
+    mesh
+        The surface: a `TriangleMesh`, anything else that `as_mesh` takes, or a `Solver`.
+    points
+        One or more vertex indices or `SurfacePoint`.
+    weights
+        (N,) numbers, 0 or more, of which one is above 0. None for the same for all.
+    barriers
+        As in `exact_distance`.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
+
+    Returns
+    -------
+    MeanPoint
+        The point, the variance, and whether the search came to its end.
+
+    Raises
+    ------
+    NoPath
+        The points are in different parts of the surface.
+    NoTangentPlane
+        The search meets a point that has none, as in `log_map`.
+    InvalidPoint
+        A point is not on the mesh.
+    InvalidArgument
+        The weights are out of their domain.
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `exact_distance`.
+
+    Notes
+    -----
+    One sweep for each point, and one for each place that the search tries.
+
+    Examples
+    --------
+    >>> mesh = gc.samples.plane(2)  # the unit square
+    >>> mean = gc.mean_point(mesh, [0, 3], weights=[3.0, 1.0])
+    >>> mesh.position(mean.point).round(6).tolist()
+    [0.25, 0.25, 0.0]
+    """
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    surface, control = _surface_of(mesh, barriers, control)
+    places = tuple(as_points(surface, points, "point", control))
+    shares = as_nonnegative("weights", 1.0 if weights is None else weights, len(places))
+    if not shares.sum() > 0.0:
+        raise InvalidArgument("weights are all 0: one must be above 0")
+    return find_mean(surface, places, shares / shares.sum(), control)
+
+
+def straighten(curve: SurfaceCurve) -> SurfaceCurve:
+    """Return a curve pulled tight: the shortest of those into which it can be moved, near it.
+
+    Its ends stay. It is straight but for bends at vertices and at the boundary, where neither side
+    leaves it less than half a turn. So it is shorter than all curves near it; another one may be
+    shorter that lies beyond a hill.
+
+    Parameters
+    ----------
+    curve
+        A path, a straight line, a line of equal value, a border, a boundary or a loop.
+
+    Returns
+    -------
+    SurfaceCurve
+        Never longer, rounding aside; closed if the curve is. Its bends are vertices, exactly. It
+        stays off barriers of the curve's mesh. Where more than two faces meet at an edge, or the
+        faces of a vertex form several fans, it passes where the curve does; so it does where a
+        one-sided surface is joined to its other side.
+
+    Raises
+    ------
+    NoLoop
+        The curve is closed, and shrinks to a point.
+    InvalidArgument
+        The curve was resampled, or is a copy without its mesh.
+
+    Notes
+    -----
+    O(faces crossed) for each vertex that the curve moves past; 500 faces take about a millisecond.
+
+    Examples
+    --------
+    >>> mesh = gc.samples.plane(200)  # the unit square
+    >>> bent = gc.shortest_path(mesh, 0, 120, waypoints=[10])
+    >>> round(bent.length, 6), round(gc.straighten(bent).length, 6)
+    (2.0, 1.414214)
+    """
+    return straightened_curve(curve, Control())
+
+
+def shortest_loop(
+    mesh: MeshLike | Solver,
+    through: Point,
+    *,
+    barriers: Iterable[int] = (),
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> SurfaceCurve:
+    """Return the shortest closed curve through a point that cannot be shrunk to a point.
+
+    It runs around a hole or a handle, or between parts of the surface each of which has one.
+
+    Parameters
+    ----------
+    mesh
+        The surface: a `TriangleMesh`, anything else that `as_mesh` takes, or a `Solver`.
+    through
+        A vertex index or a `SurfacePoint`.
+    barriers
+        As in `exact_distance`: faces that count as holes.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
+
+    Returns
+    -------
+    SurfaceCurve
+        It begins at the point; the shortest of all, not only of those near it. `straighten` takes
+        the bend out that it may have there.
+
+    Raises
+    ------
+    NoLoop
+        On this part of the surface every loop shrinks to a point.
+    InvalidMesh
+        The mesh is no surface with two sides.
+    InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `exact_distance`.
+
+    Notes
+    -----
+    Exact sweeps over the universal cover, up to the length of the loop: of copies of the surface,
+    as many as lie that near. It takes some ten sweeps where there is one handle, more where there
+    are many.
+
+    Examples
+    --------
+    >>> plate = gc.samples.obstacles(2000)  # with holes
+    >>> loop = gc.shortest_loop(plate, through=0)
+    >>> loop.closed, round(loop.length, 3)
+    (True, 4.946)
+    """
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    surface, control = _surface_of(mesh, barriers, control)
+    quiet = replace(control, progress=None)  # how many sweeps it takes is not known
+    loop = shortest_loop_through(surface, surface.point(through, "through"), quiet)
+    control.checkpoint(1.0)
+    return loop
+
+
+def handle_loops(
+    mesh: MeshLike | Solver,
+    *,
+    barriers: Iterable[int] = (),
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> list[SurfaceCurve]:
+    """Return two loops for each handle of a surface, such as one around it and one along it.
+
+    Cut along all of them, no handle is left. None of them can be moved into others, nor into what
+    these make up together. Which of the two goes around the handle and which along it is a question
+    of the space around the surface, and not told.
+
+    Parameters
+    ----------
+    mesh
+        The surface: a `TriangleMesh`, anything else that `as_mesh` takes, or a `Solver`.
+    barriers
+        As in `exact_distance`. Holes are no handles.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
+
+    Returns
+    -------
+    list of SurfaceCurve
+        Closed, as short as those near them; the shortest first. Empty where there is no handle.
+
+    Raises
+    ------
+    InvalidMesh
+        The mesh is no surface with two sides.
+    InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `exact_distance`.
+
+    Notes
+    -----
+    A few exact sweeps.
+
+    Examples
+    --------
+    >>> knot = gc.samples.knot(2000)
+    >>> [round(loop.length, 1) for loop in gc.handle_loops(knot)]
+    [2.8, 25.7]
+    >>> gc.handle_loops(gc.samples.sphere(320))
+    []
+    """
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    surface, control = _surface_of(mesh, barriers, control)
+    loops = handle_loops_of(surface, replace(control, progress=None))
+    control.checkpoint(1.0)
+    return loops
+
+
+def paths_around(
+    mesh: MeshLike | Solver,
+    source: Point,
+    target: Point,
+    obstacle: Point | SurfaceCurve | Iterable[int],
+    *,
+    barriers: Iterable[int] = (),
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> tuple[GeodesicPath, GeodesicPath]:
+    """Return the shortest path on each side of an obstacle: left of it, and right.
+
+    The sides are told by the shortest line of edges from the obstacle to the outside: the longest
+    other boundary, or where there is none the vertex farthest from all three. Of the paths that
+    cross it an even number of times, and of those that cross it an odd number, the shortest is
+    returned. Each is exact, among all such paths, and may pass other holes on any side.
+
+    Parameters
+    ----------
+    mesh
+        The surface: a `TriangleMesh`, anything else that `as_mesh` takes, or a `Solver`.
+    source, target
+        Vertex indices or `SurfacePoint`.
+    obstacle
+        A hole, as a curve of `TriangleMesh.boundaries`; a barrier, as the ids of its faces, which
+        are to be connected; or a vertex, on which the paths may touch.
+    barriers
+        As in `exact_distance`: further faces that count as holes.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
+
+    Returns
+    -------
+    tuple of GeodesicPath
+        The path that has the obstacle on its right, and the one that has it on its left.
+
+    Raises
+    ------
+    NoPath
+        The points are not connected, or on one side of the obstacle only.
+    InvalidMesh
+        The mesh is no surface with two sides.
+    InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `shortest_path`.
+
+    Notes
+    -----
+    Two searches as that of `shortest_path`, on a mesh of twice as many faces.
+
+    Examples
+    --------
+    >>> mesh = gc.samples.plane(200)  # the unit square
+    >>> left, right = gc.paths_around(mesh, 55, 65, obstacle=range(86, 94))
+    >>> round(left.length, 3), round(right.length, 3)
+    (1.086, 1.086)
+    """
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    surface, control = _surface_of(mesh, barriers, control)
+    wide, place = surface, unboxed(obstacle)
+    if isinstance(place, SurfacePoint) or is_index(place):
+        place = surface.point(place, "obstacle")
+    elif not isinstance(place, SurfaceCurve):
+        surface, control = with_barriers(surface, place, control)
+        place = None
+    ends = surface.point(source, "source"), surface.point(target, "target")
+    paths = paths_on_both_sides(surface, *ends, obstacle_of(surface, wide, place), control)
+    control.checkpoint(1.0)
+    return paths
+
+
 class Solver:
     """Solvers of one mesh that reuse memory and landmarks from call to call.
 
@@ -845,6 +1303,12 @@ class Solver:
     log_map = log_map
     trace = trace
     cut = cut
+    farthest_points = farthest_points
+    relax_points = relax_points
+    mean_point = mean_point
+    shortest_loop = shortest_loop
+    handle_loops = handle_loops
+    paths_around = paths_around
 
 
 def _surface_of(

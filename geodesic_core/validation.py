@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geodesic_core.arrays import Floats, Longs
 from geodesic_core.errors import InvalidArgument, InvalidPoint
@@ -86,6 +87,31 @@ def as_angle(angle: float) -> float:
     if not is_number(angle) or not math.isfinite(angle):
         raise InvalidArgument(f"angle is {angle!r}; it must be a finite number, in radians")
     return float(angle)
+
+
+def as_nonnegative(name: str, values: ArrayLike, count: int) -> Floats:
+    """Return so many numbers, 0 or more; a single one stands for all.
+
+    Raises
+    ------
+    InvalidArgument
+        They are none.
+    """
+    try:
+        given = np.asarray(values, np.float64)
+    except (TypeError, ValueError):
+        given = np.empty(0)
+    if given.shape not in ((), (count,)):
+        raise InvalidArgument(
+            f"{name} has shape {np.shape(values)}; it must be numbers, ({count},)"
+        )
+    given = np.broadcast_to(given, (count,))
+    bad = np.flatnonzero(~(np.isfinite(given) & (given >= 0.0)))
+    if len(bad):
+        raise InvalidArgument(
+            f"{name}[{bad[0]}] is {given[bad[0]]}; it must be a number, 0 or more"
+        )
+    return given
 
 
 def as_limit(max_distance: float | None) -> float:

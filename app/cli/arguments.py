@@ -63,11 +63,11 @@ STANDARD_STREAM = Path("-")
 """Standard input, or standard output"""
 
 
-def writable(*suffixes: str) -> Callable[[Path | None], Path | None]:
+def writable(*suffixes: str, to_stdout: bool = True) -> Callable[[Path | None], Path | None]:
     """Return a check of an output path that is made before any work begins."""
 
     def check(path: Path | None) -> Path | None:
-        if path is None or path == STANDARD_STREAM:
+        if path is None or (path == STANDARD_STREAM and to_stdout):
             return path
         if path.suffix.lower() not in suffixes:
             *others, last = suffixes

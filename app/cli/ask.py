@@ -5,7 +5,15 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from app.cli.barriers import BlockedFaces
-from app.cli.points import Direction, Point, PointOrCurve, PointOrLabel, Position
+from app.cli.points import (
+    CurvesToCut,
+    CurveToCut,
+    Direction,
+    Point,
+    PointOrCurve,
+    PointOrLabel,
+    Position,
+)
 from app.cli.steps import Failure, MeshInput, read, showing
 from app.cli.words import say_warning, words_of
 
@@ -16,8 +24,10 @@ if TYPE_CHECKING:
     from app.errors import Problem
     from geodesic_core import TriangleMesh
 
-Written = Point | PointOrCurve | Position | Direction
-WrittenMembers = Mapping[str, Written | Sequence[Written] | Sequence[PointOrLabel]]
+Written = Point | PointOrCurve | CurveToCut | Position | Direction
+Several = PointOrLabel | CurvesToCut
+"""What an option names at once"""
+WrittenMembers = Mapping[str, Written | Sequence[Written] | Sequence[Several]]
 """Points by the member of the request that they become."""
 
 _OPTIONS = {
@@ -30,6 +40,7 @@ _OPTIONS = {
     "starts": "--from",
     "directions": "--direction",
     "lengths": "--length",
+    "curves": "--along",
 }
 """Options whose names differ from their members."""
 
@@ -99,14 +110,17 @@ def check(kind: str, **members: Any) -> None:
 
 
 def _on_mesh(
-    written: Written | Sequence[Written] | Sequence[PointOrLabel], mesh: "TriangleMesh"
+    written: Written | Sequence[Written] | Sequence[Several], mesh: "TriangleMesh"
 ) -> Written | Sequence[Written]:
-    """Return points that are named by themselves, those of labels one by one."""
+    """Return points that are named by themselves, those of labels and files one by one."""
     if isinstance(written, Written):
         return written
     found: list[Written] = []
     for each in written:
-        found += each.on(mesh) if isinstance(each, PointOrLabel) else [each]
+        if isinstance(each, PointOrLabel):
+            found += each.on(mesh)
+        else:
+            found += each.curves if isinstance(each, CurvesToCut) else [each]
     return found
 
 

@@ -1,7 +1,8 @@
 """Points as options name them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -72,6 +73,33 @@ class PointOrLabel:
 
 
 @dataclass(frozen=True)
+class CurveToCut:
+    """A curve to cut along: as it was written, or a line of a file."""
+
+    text: str
+    curve: dict[str, Any]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the curve as a member of a request."""
+        return self.curve
+
+
+@dataclass(frozen=True)
+class CurvesToCut:
+    """A curve, or all lines of a file."""
+
+    curves: Sequence[CurveToCut]
+
+    @classmethod
+    def parse(cls, text: str) -> "CurvesToCut":
+        """Return the curve that an option names, or the lines of ``@FILE``."""
+        if text.startswith("@"):
+            return cls([CurveToCut(text, curve) for curve in _lines_in(Path(text[1:]))])
+        points = [point.as_json() for point in PointOrCurve.parse(text).points]
+        return cls([CurveToCut(text, {"polyline": points})])
+
+
+@dataclass(frozen=True)
 class Position:
     """A position in space, as it was written and as it was parsed."""
 
@@ -119,6 +147,37 @@ class Direction:
     def as_json(self) -> Any:
         """Return the direction as a member of a request."""
         return self.direction
+
+
+def _lines_in(file: Path) -> list[dict[str, Any]]:
+    """Return the lines that an answer in JSON has with their locations, as curves of a request."""
+    import orjson
+
+    try:
+        answer = orjson.loads(file.read_bytes())
+    except OSError as error:
+        raise typer.BadParameter(f"cannot read {file}: {error.strerror}") from None
+    except ValueError as error:
+        raise typer.BadParameter(f"{file} is not JSON: {error}") from None
+    curves = [
+        {"polyline": line["locations"], "closed": line.get("closed", False)}
+        for line in _lines_of(answer)
+    ]
+    if not curves:
+        raise typer.BadParameter(
+            f"{file} has no lines with locations: write it by path, paths or trace, or with "
+            "--locations by isolines, borders or boundaries"
+        )
+    return curves
+
+
+def _lines_of(answer: Any) -> Iterator[dict[str, Any]]:
+    """Yield all objects in a JSON value that have locations."""
+    if isinstance(answer, dict) and answer.get("locations"):
+        yield answer
+    elif isinstance(answer, dict | list):
+        for each in answer.values() if isinstance(answer, dict) else answer:
+            yield from _lines_of(each)
 
 
 def _refuse_label(text: str) -> None:

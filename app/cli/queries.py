@@ -39,7 +39,7 @@ from app.cli.arguments import (
 from app.cli.ask import Answered, ask
 from app.cli.barriers import BlockedFaces
 from app.cli.output import AsJson, Output
-from app.cli.points import Direction, Point, Position
+from app.cli.points import CurvesToCut, Direction, Point, Position
 from app.cli.steps import Failure, MeshInput
 from app.cli.summary import bound_in_words, print_bound, print_end, print_size
 from app.cli.values_file import Values
@@ -101,7 +101,9 @@ _LINES = ".obj", ".csv", ".json"
 
 
 def _out(what: str, *suffixes: str) -> Options:
-    option = typer.Option(help=f"Where the {what}", callback=writable(*suffixes))
+    option = typer.Option(
+        help=f"Where the {what}", callback=writable(*suffixes, to_stdout=".csv" in suffixes)
+    )
     return {"out": (Annotated[Path | None, option], None)}
 
 
@@ -111,6 +113,18 @@ def _points(help_text: str, *, default: Any = _NEEDED, several: bool = True) -> 
     return Annotated[kind if default is _NEEDED else kind | None, option], default
 
 
+_WITH_LOCATIONS: Options = {
+    "locations": (
+        Annotated[
+            bool,
+            typer.Option(
+                "--locations",
+                help="In .json and .csv also faces and weights of the points, as cut takes them.",
+            ),
+        ],
+        False,
+    )
+}
 _POINTS_OUT = _out("points go, too: .csv or .json; - prints .csv.", ".csv", ".json")
 _LINES_OUT = _out("lines go: .obj (polylines), .csv or .json; - prints .csv.", *_LINES)
 _STOPS: Options = {
@@ -204,6 +218,17 @@ def _barriers(given: Given) -> dict[str, Any]:
     return {"barriers": given["barriers"] or BlockedFaces()}
 
 
+def _of_cut(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
+    yield f"cut         {found['vertices']} vertices, {found['faces']} faces"
+    yield f"parts       {found['parts']}"
+    if found["snapped"]["count"]:
+        yield f"snapped     {found['snapped']['count']} points, to a vertex or an edge"
+
+
+def _apart(given: Given) -> dict[str, Any]:
+    return {"separate": not given["whole"]}
+
+
 def _of_isolines(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
     for each in found["isolines"]:
         lines = each["lines"]
@@ -213,6 +238,36 @@ def _of_isolines(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
             f"level       {each['level']!r}: {closed} closed, {len(lines) - closed} open, "
             f"{float(length)!r} long"
         )
+
+
+def _spread(given: Given) -> dict[str, Any]:
+    if given["count"] is None and given["radius"] is None:
+        raise typer.BadParameter("give --count or --radius, or both")
+    return {name: given[name] for name in ("count", "radius", "iterations")} | _barriers(given)
+
+
+def _of_samples(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
+    yield f"points      {len(found['points'])}"
+    yield f"reach       {found['covering_radius']!r}"
+    if found["costs"]:
+        state = "converged" if found["converged"] else "not converged"
+        yield f"cost        {found['costs'][0]!r}, then {found['costs'][-1]!r}: {state}"
+
+
+def _of_cells(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
+    for i, area in enumerate(found["areas"]):
+        yield f"cell        of source {i}: {area!r}"
+    yield f"neighbours  {len(found['neighbours'])} pairs"
+
+
+def _weighted(given: Given) -> dict[str, Any]:
+    return {"weights": given["weight"] or None, **_barriers(given)}
+
+
+def _of_mean(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
+    yield from _place(found["mean"])
+    state = "converged" if found["converged"] else "not converged"
+    yield f"variance    {found['variance']!r}, {state} after {found['moves']} moves"
 
 
 def _of_borders(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
@@ -245,13 +300,18 @@ def _of_nearest(given: Given, found: Mapping[str, Any]) -> Iterator[str]:
         yield f"nearest     {given['candidate'][each['candidate']].text} at {each['distance']!r}"
 
 
-def _of_locate(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
-    (point,) = found["points"]
+def _place(point: Mapping[str, Any]) -> Iterator[str]:
     if "vertex" in point:
         yield f"point       v{point['vertex']}"
     else:
         yield f"point       f{point['face']}:{','.join(map(repr, point['barycentric']))}"
-    yield f"position    {','.join(map(repr, point['position']))}"
+    if point["position"] is not None:
+        yield f"position    {','.join(map(repr, point['position']))}"
+
+
+def _of_locate(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
+    (point,) = found["points"]
+    yield from _place(point)
     yield f"distance    {point['distance']!r}"
 
 
@@ -373,6 +433,7 @@ COMMANDS = {
                 None,
             ),
             **_LINES_OUT,
+            **_WITH_LOCATIONS,
             "level": (
                 Annotated[
                     list[float] | None,
@@ -404,7 +465,13 @@ COMMANDS = {
         "borders",
         "Draw the borders between the parts of the surface that are nearest to each source.",
         "Drawing borders",
-        {"source": (PointOrCurveSources, _NEEDED), **_LINES_OUT, **_CHORD_ERROR, **_REACH},
+        {
+            "source": (PointOrCurveSources, _NEEDED),
+            **_LINES_OUT,
+            **_WITH_LOCATIONS,
+            **_CHORD_ERROR,
+            **_REACH,
+        },
         {"sources": "source"},
         _of_borders,
     ),
@@ -412,10 +479,123 @@ COMMANDS = {
         "boundaries",
         "Find the boundary of the surface, as lines along its edges.",
         "Following the boundary",
-        {**_LINES_OUT, "barriers": (Barriers, None)},
+        {**_LINES_OUT, **_WITH_LOCATIONS, "barriers": (Barriers, None)},
         {},
         _of_boundaries,
         _barriers,
+    ),
+    "farthest": Command(
+        "samples",
+        "Spread points over the surface, each the farthest from those before.",
+        "Spreading points",
+        {
+            "count": (
+                Annotated[int | None, typer.Option(min=1, help="How many, --from included.")],
+                None,
+            ),
+            "radius": (
+                Annotated[
+                    float | None,
+                    typer.Option(min=0.0, help="The covering radius to reach, mesh units."),
+                ],
+                None,
+            ),
+            "start": (
+                Annotated[
+                    list[Point] | None,
+                    typer.Option(
+                        "--from",
+                        parser=Point.parse,
+                        metavar="POINT",
+                        help=f"A point to begin with, {SPELLINGS}; vertex 0 by default. May be "
+                        "repeated.",
+                    ),
+                ],
+                None,
+            ),
+            "iterations": (
+                Annotated[
+                    int,
+                    typer.Option(
+                        min=0, help="How often points then move to the middle of their cells."
+                    ),
+                ],
+                0,
+            ),
+            **_POINTS_OUT,
+            "barriers": (Barriers, None),
+        },
+        {"starts": "start"},
+        _of_samples,
+        _spread,
+    ),
+    "cells": Command(
+        "cells",
+        "Measure the parts of the surface that are nearest to each source.",
+        "Cutting cells",
+        {
+            "source": (PointOrCurveSources, _NEEDED),
+            **_POINTS_OUT,
+            **_CHORD_ERROR,
+            **_REACH,
+        },
+        {"sources": "source"},
+        _of_cells,
+    ),
+    "mean": Command(
+        "mean",
+        "Find the mean of points: where squared distances from them sum to the least.",
+        "Looking for the mean",
+        {
+            "at": _points("A point; may be repeated."),
+            "weight": (
+                Annotated[
+                    list[float] | None,
+                    typer.Option(min=0.0, help="Its weight; give none, or one for each point."),
+                ],
+                None,
+            ),
+            **_out("answer goes: .json.", ".json"),
+            "barriers": (Barriers, None),
+        },
+        {"points": "at"},
+        _of_mean,
+        _weighted,
+    ),
+    "cut": Command(
+        "cut",
+        "Cut the mesh along curves, so that they are edges and the surface comes apart.",
+        "Cutting",
+        {
+            "along": (
+                Annotated[
+                    list[CurvesToCut],
+                    typer.Option(
+                        parser=CurvesToCut.parse,
+                        metavar="CURVE|@FILE.json",
+                        help="A curve: points separated by /, each in one face with the next, as "
+                        "12/e13-14:0.5/15; or the lines of an answer that was written to a file. "
+                        "May be repeated.",
+                    ),
+                ],
+                _NEEDED,
+            ),
+            **_out(
+                "cut mesh goes: .ply, or .npz with the arrays that lead back to the old one, too; "
+                ".json tells its sizes.",
+                *(".ply", ".npz", ".json"),
+            ),
+            "whole": (
+                Annotated[
+                    bool,
+                    typer.Option("--whole", help="Do not let the surface come apart."),
+                ],
+                False,
+            ),
+        },
+        {"curves": "along"},
+        _of_cut,
+        _apart,
     ),
     "nearest": Command(
         "nearest",
@@ -572,6 +752,8 @@ def _run(command: Command, given: dict[str, Any]) -> None:
         members |= accuracy(**{name: given[name] for name in names})
     if "chord_error" in given:
         members["chord_error"] = given["chord_error"]
+    if given.get("locations"):
+        members["include"] = ["locations"]
     if "max_distance" in given:
         members |= limits(given["max_distance"], given["barriers"])
     points = {member: given[option] or [] for member, option in command.points.items()}

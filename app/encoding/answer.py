@@ -33,6 +33,8 @@ class Answer:
         line.
     array
         Makes the body in binary formats where it is not the first of the ``arrays`` itself.
+    named
+        Arrays by name, for npz where the answer is no sparse matrix.
     """
 
     members: Mapping[str, Any]
@@ -43,6 +45,7 @@ class Answer:
     lines: Callable[[], Sequence[Line]] | None = None
     surface: Surface | None = None
     array: Callable[[], NDArray[np.float64]] | None = None
+    named: Mapping[str, NDArray[Any]] | None = None
 
 
 Encoded = tuple[Iterable[Buffer], Mapping[str, str]]

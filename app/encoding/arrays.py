@@ -32,7 +32,11 @@ def to_octets(answer: Answer, dtype: str) -> Encoded:
 
 
 def to_npz(answer: Answer, dtype: str) -> Encoded:
-    """Encode a sparse matrix as `scipy.sparse.load_npz` reads it, and `write_matrix` writes it."""
+    """Encode a sparse matrix as `scipy.sparse.load_npz` reads it, or arrays by name."""
+    if answer.named is not None:
+        file = BytesIO()
+        np.savez(file, allow_pickle=False, **answer.named)
+        return [file.getbuffer()], headers_of(answer, ())
     from scipy.sparse import coo_array
 
     _, rows, columns = (answer.members[name] for name in answer.arrays)

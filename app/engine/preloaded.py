@@ -16,6 +16,7 @@ LATE = (
     "igl",
     "manifold3d",
     "scipy.sparse",
+    "scipy.sparse.csgraph",
     "scipy.spatial",
 )
 

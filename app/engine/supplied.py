@@ -8,6 +8,7 @@ from contextlib import contextmanager, suppress
 from app.engine.interface import Engine, Load, ProgressCallback, UnclaimedCallback, ignore_unclaimed
 from app.engine.work import (
     JoinParts,
+    MeshFromCut,
     MeshFromFile,
     StoreMesh,
     Task,
@@ -117,9 +118,15 @@ class SuppliedEngine:
     async def _compute(
         self, task: Task, work: WritesResult, on_progress: ProgressCallback
     ) -> TaskResult:
-        mesh_id = work.query.mesh_id
         parts = work.parts if isinstance(work, JoinParts) else ()
-        async with self._supply.holding(mesh_id), self._supply.bringing_results(parts):
+        async with self._supply.bringing_results(parts):
+            return await self._run_on_mesh(work.query.mesh_id, task, on_progress)
+
+    async def _run_on_mesh(
+        self, mesh_id: str, task: Task, on_progress: ProgressCallback
+    ) -> TaskResult:
+        """Have a task done with a mesh in the folder."""
+        async with self._supply.holding(mesh_id):
             try:
                 return await self._engine.run(task, on_progress)
             except ProblemError as error:
@@ -153,9 +160,13 @@ class SuppliedEngine:
     ) -> TaskResult:
         given = work.mesh_input
         file = given.path if isinstance(given, MeshFromFile) else None
+        old = given.query.mesh_id if isinstance(given, MeshFromCut) else None
         async with self._supply.bringing(file, work.folder):
             while True:
-                done = await self._engine.run(task, on_progress)
+                if old is None:
+                    done = await self._engine.run(task, on_progress)
+                else:
+                    done = await self._run_on_mesh(old, task, on_progress)
                 assert done.mesh is not None, "this kind of work writes a mesh"  # noqa: S101
                 if await self._supply.send_mesh(done.mesh):
                     return done

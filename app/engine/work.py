@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from app.errors import Problem
-from app.queries import MatrixQuery, Query
+from app.queries import CutQuery, MatrixQuery, Query
 from app.schemas.meshes import Merge
 from app.store.meshes import WrittenMesh
 from app.store.results import Result
@@ -32,7 +32,14 @@ class MeshFromSample:
     merge: Merge
 
 
-MeshInput = MeshFromFile | MeshFromSample
+@dataclass(frozen=True)
+class MeshFromCut:
+    """A stored mesh that is cut along curves."""
+
+    query: CutQuery
+
+
+MeshInput = MeshFromFile | MeshFromSample | MeshFromCut
 
 
 @dataclass(frozen=True)
@@ -104,6 +111,8 @@ class TaskResult:
     periods: Mapping[str, Period] = field(default_factory=dict)
     """Begin and end of each phase, for traces"""
     mesh: WrittenMesh | None = None
+    about_mesh: Mapping[str, Any] = field(default_factory=dict)
+    """What the answer to a cut tells besides"""
     result: Result | None = None
 
 

@@ -21,9 +21,9 @@ from app.engine.signals import Signals
 from app.engine.work import (
     ComputePart,
     JoinParts,
+    MeshFromCut,
     MeshFromFile,
     MeshFromSample,
-    MeshInput,
     Outcome,
     RunQuery,
     StoreMesh,
@@ -33,17 +33,19 @@ from app.engine.work import (
 from app.errors import problem_of, too_large_unpacked
 from app.queries import (
     SMALL_SECONDS,
+    CutQuery,
     ExecutionContext,
     FieldCache,
     Query,
     Unwritten,
     code_version,
 )
+from app.queries.cut import arrays_of
 from app.queries.validation import check_json_size, invalid_fields, naming
 from app.settings import Settings
 from app.store.fields import FieldStore
 from app.store.lru_cache import LRUCache
-from app.store.meshes import MeshStore, OpenMesh
+from app.store.meshes import CutFrom, MeshStore, OpenMesh, WrittenMesh
 from app.store.results import Buffer, body_path, write_result, write_result_file
 from app.store.scratch import most_unpacked
 from app.tracing import Period
@@ -133,22 +135,46 @@ class Worker:
                 return self._join_parts(work, clock, is_cancelled)
 
     def _store(self, work: StoreMesh, clock: "Clock", cancel: Callable[[], bool]) -> TaskResult:
-        try:
+        given = work.mesh_input
+        if isinstance(given, MeshFromCut):
+            return self._store_cut(work, given.query, clock, cancel)
+        with _in_scratch_folder(cancel):
             with clock.phase("load"):
-                mesh = _make_mesh(work.mesh_input, self.settings, cancel)
-            _stop_if(cancel)
-            with clock.phase("store"):
-                check = partial(_stop_if, cancel)
-                written = self.store.write_aside(mesh, work.folder, work.name, check)
-        except FileNotFoundError:
-            if cancel():  # then the upload and the scratch folder are removed
-                raise gc.errors.Cancelled from None
-            raise
+                mesh = _make_mesh(given, self.settings, cancel)
+            written = self._write_aside(mesh, work, clock, cancel)
         return TaskResult(clock.seconds, clock.periods, mesh=written)
 
-    def _answer(self, work: RunQuery, clock: "Clock", cancel: Callable[[], bool]) -> TaskResult:
+    def _store_cut(
+        self, work: StoreMesh, query: CutQuery, clock: "Clock", cancel: Callable[[], bool]
+    ) -> TaskResult:
+        with clock.phase("load"):
+            opened = self._open(query)
+        with clock.phase("compute"):
+            cut, about = query.make(opened, self._context(cancel))
+            _refuse_size(len(cut.vertices), len(cut.faces), self.settings)
+            _stop_if(cancel)
+            mesh = cut.mesh
+        with _in_scratch_folder(cancel):
+            origin = CutFrom(query.mesh_id, arrays_of(cut))
+            written = self._write_aside(mesh, work, clock, cancel, origin)
+        return TaskResult(clock.seconds, clock.periods, mesh=written, about_mesh=about)
+
+    def _write_aside(
+        self,
+        mesh: gc.TriangleMesh,
+        work: StoreMesh,
+        clock: "Clock",
+        cancel: Callable[[], bool],
+        cut_from: CutFrom | None = None,
+    ) -> WrittenMesh:
+        check = partial(_stop_if, cancel)
+        check()
+        with clock.phase("store"):
+            return self.store.write_aside(mesh, work.folder, work.name, check, cut_from)
+
+    def _context(self, cancel: Callable[[], bool]) -> ExecutionContext:
         settings = self.settings
-        context = ExecutionContext(
+        return ExecutionContext(
             cancel,
             self._report,
             self.fields,
@@ -156,6 +182,9 @@ class Worker:
             settings.max_json_values,
             settings.max_matrix_cells,
         )
+
+    def _answer(self, work: RunQuery, clock: "Clock", cancel: Callable[[], bool]) -> TaskResult:
+        settings, context = self.settings, self._context(cancel)
         with clock.phase("load"):
             opened = self._open(work.query)
         with clock.phase("compute"):
@@ -311,17 +340,34 @@ class Clock:
         self.periods[name] = Period(start_ns, time_ns())
 
 
+@contextmanager
+def _in_scratch_folder(cancel: Callable[[], bool]) -> Iterator[None]:
+    """Take missing files for a cancelled request, which removes its upload and scratch folder."""
+    try:
+        yield
+    except FileNotFoundError:
+        if cancel():
+            raise gc.errors.Cancelled from None
+        raise
+
+
+def _refuse_size(vertices: int, faces: int, settings: Settings) -> None:
+    if faces > settings.max_faces:
+        raise gc.errors.TooManyFaces(faces, settings.max_faces)
+    if vertices > settings.max_vertices:
+        raise gc.errors.TooManyVertices(vertices, settings.max_vertices)
+
+
 def _make_mesh(
-    mesh_input: MeshInput, settings: Settings, cancel: Callable[[], bool]
+    mesh_input: MeshFromFile | MeshFromSample, settings: Settings, cancel: Callable[[], bool]
 ) -> gc.TriangleMesh:
     mesh = _read_mesh(mesh_input, settings, cancel)
-    if len(mesh.vertices) > settings.max_vertices:  # which lengths alone do not tell before
-        raise gc.errors.TooManyVertices(len(mesh.vertices), settings.max_vertices)
+    _refuse_size(len(mesh.vertices), 0, settings)  # which lengths alone do not tell before
     return mesh
 
 
 def _read_mesh(
-    mesh_input: MeshInput, settings: Settings, cancel: Callable[[], bool]
+    mesh_input: MeshFromFile | MeshFromSample, settings: Settings, cancel: Callable[[], bool]
 ) -> gc.TriangleMesh:
     max_faces, max_vertices = settings.max_faces, settings.max_vertices
     faces: NDArray[np.int32] | NDArray[np.int64]
@@ -350,10 +396,7 @@ def _read_mesh(
                     )
             except gc.errors.FileTooLarge:
                 raise too_large_unpacked(max_bytes, settings.max_upload_bytes) from None
-    if len(faces) > max_faces:
-        raise gc.errors.TooManyFaces(len(faces), max_faces)
-    if vertices is not None and len(vertices) > max_vertices:
-        raise gc.errors.TooManyVertices(len(vertices), max_vertices)
+    _refuse_size(0 if vertices is None else len(vertices), len(faces), settings)
     if sample is not None and mesh_input.merge == "none":
         return sample
     _stop_if(cancel)

@@ -19,7 +19,7 @@ from app.encoding import Representation, coding_quality, negotiate, negotiate_co
 from app.encoding.representation import ARRAYS, TEXTS
 from app.errors import Fault, problem
 from app.schemas.requests import AnswerParameters
-from app.service.answering import PhaseSeconds
+from app.service.mesh_storing import PhaseSeconds
 from app.service.request_context import RequestContext
 from app.service.service import Service
 

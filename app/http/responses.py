@@ -20,8 +20,7 @@ from app.encoding import JSON
 from app.errors import CODES, PROBLEM_JSON, Problem
 from app.jobs import Job
 from app.schemas.service import ProblemDocument
-from app.service.answering import PhaseSeconds
-from app.service.service import Manifest
+from app.service.mesh_storing import Manifest, PhaseSeconds
 from app.store.meshes import public_arrays
 from app.store.objects import RemoteBody, RemoteFile
 from app.store.results import Result, ResultStore
@@ -139,6 +138,7 @@ def mesh_document(manifest: Manifest, prefix: str) -> dict[str, Any]:
         **manifest["report"],
         "warnings": manifest["warnings"],
         "created": manifest["created"],
+        "cut_from": manifest.get("cut_from"),
         "arrays": {
             name: f"{prefix}/v1/meshes/{mesh_id}/arrays/{name}" for name in public_arrays(manifest)
         },
@@ -203,6 +203,7 @@ def result_response(
     media_type: str,
     store: ResultStore,
     headers: Mapping[str, str],
+    status: int = 200,
 ) -> Response:
     """Return an acquired result, from memory or from its file, and release it once it is sent.
 
@@ -220,6 +221,8 @@ def result_response(
         The store to release the result to.
     headers
         Further headers, such as those of caching.
+    status
+        The status of the whole.
     """
     own = {"ETag": etag_of(result.key), **server_timing(seconds)}
     accepted = "none" if "Content-Encoding" in result.manifest.headers else "bytes"
@@ -227,7 +230,7 @@ def result_response(
     if result.body is None or "range" in request.headers:
         return _ResultFileResponse(result, media_type, store, headers)
     store.release(result)
-    return Response(result.body, headers=headers, media_type=media_type)
+    return Response(result.body, status, headers, media_type)
 
 
 class _ResultFileResponse(StoredFileResponse):

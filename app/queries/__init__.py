@@ -17,15 +17,19 @@ from app.queries.base import (
 )
 from app.queries.borders import BordersQuery
 from app.queries.boundaries import BoundariesQuery
+from app.queries.cells import CellsQuery
+from app.queries.cut import CutQuery
 from app.queries.distances import DistancesQuery
 from app.queries.field_cache import FieldCache, Unwritten
 from app.queries.isolines import IsolinesQuery
 from app.queries.locate import LocateQuery
 from app.queries.log_map import LogMapQuery
 from app.queries.matrix import MatrixQuery
+from app.queries.mean import MeanQuery
 from app.queries.nearest import NearestQuery
 from app.queries.path import PathQuery, naming_parameters, written_request
 from app.queries.paths import PathsQuery
+from app.queries.samples import SamplesQuery
 from app.queries.steps import StepsQuery
 from app.queries.trace import TraceQuery
 from app.queries.validation import MeshSize, check_lengths
@@ -40,6 +44,10 @@ KINDS: Mapping[str, type[Query[Any]]] = {
         IsolinesQuery,
         BordersQuery,
         BoundariesQuery,
+        CutQuery,
+        CellsQuery,
+        SamplesQuery,
+        MeanQuery,
         MatrixQuery,
         NearestQuery,
         LogMapQuery,
@@ -54,6 +62,8 @@ __all__ = [
     "SMALL_SECONDS",
     "BordersQuery",
     "BoundariesQuery",
+    "CellsQuery",
+    "CutQuery",
     "DistancesQuery",
     "ExecutionContext",
     "FieldCache",
@@ -61,11 +71,13 @@ __all__ = [
     "LocateQuery",
     "LogMapQuery",
     "MatrixQuery",
+    "MeanQuery",
     "MeshSize",
     "NearestQuery",
     "PathQuery",
     "PathsQuery",
     "Query",
+    "SamplesQuery",
     "StepsQuery",
     "TraceQuery",
     "Unwritten",

@@ -27,7 +27,7 @@ from app.queries.validation import (
     naming,
 )
 from app.schemas.points import StrictModel
-from app.schemas.requests import AmongBarriers
+from app.schemas.requests import AmongBarriers, QueryBody
 from app.settings import Settings
 from app.store.meshes import OpenMesh
 
@@ -95,7 +95,7 @@ class Query(ABC, Generic[R]):
 
     kind: ClassVar[str]
     """The name of the kind for clients"""
-    model: ClassVar[type[StrictModel]]
+    model: ClassVar[type[QueryBody]]
     """The model of its requests"""
 
     @classmethod

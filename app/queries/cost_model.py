@@ -34,12 +34,16 @@ PER_FACE_BLOCKED = 0.4e-6
 """To make a mesh with barriers: for each of its faces."""
 PER_FACE_SCANNED = 0.02e-6
 """To look for the boundary, or for a level of given values: for each face."""
+PER_FACE_STORED = 3e-6
+"""To make a mesh and to store it: for each of its faces."""
 PER_PATH = 0.3e-3
 """To trace a path, and to describe it."""
 DIRECTED = 1.1
 """Time of a sweep whose windows carry directions, for that of another."""
 PER_FACE_TRACED = 2e-6
 """For each face that a straight line crosses, about one for each mean edge of its length."""
+SWEEPS_OF_SAMPLES, SWEEPS_OF_ITERATION, SWEEPS_OF_MEAN = 6.0, 1.3, 10.0
+"""Of farthest points, in all; of an iteration that relaxes them; of the search for a mean."""
 FACES_ON_LEVEL = 4.0
 """Faces that an isoline crosses, for the √n of n faces: about those of a great circle."""
 

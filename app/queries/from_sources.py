@@ -7,10 +7,10 @@ from app.queries.base import Query
 from app.queries.cost_model import share_reached
 from app.queries.points import point_count, points_in_sources
 from app.queries.validation import WrittenPoints, check_count
-from app.schemas.requests import BordersRequest, DistancesRequest, IsolinesRequest
+from app.schemas.requests import BordersRequest, CellsRequest, DistancesRequest, IsolinesRequest
 from app.settings import Settings
 
-R = TypeVar("R", bound=DistancesRequest | IsolinesRequest | BordersRequest)
+R = TypeVar("R", bound=DistancesRequest | IsolinesRequest | BordersRequest | CellsRequest)
 
 
 class FromSources(Query[R]):

@@ -128,22 +128,27 @@ def table_of_sparse(rows: Column, columns: Column, distances: Column) -> Table:
 _MATRIX = "source", "target", "distance"
 
 
-def table_of_points(index: str, found: Sequence[Mapping[str, Any] | None]) -> Table:
-    """Return a row for each described point, numbered by ``index`` unless it has that member."""
+def table_of_points(
+    index: str, found: Sequence[Mapping[str, Any] | None], value: str = "distance"
+) -> Table:
+    """Return a row for each described point, numbered by ``index`` unless it has that member.
+
+    The second column is its member ``value``.
+    """
 
     def rows() -> Iterator[Sequence[Any]]:
         for i, described in enumerate(found):
             each = described or {}
             yield (
                 each.get(index, i),
-                each.get("distance"),
+                each.get(value),
                 *(each.get("position") or _NOTHING),
                 each.get("vertex"),
                 each.get("face"),
                 *each.get("barycentric", _NOTHING),
             )
 
-    return Table([index, "distance", *"xyz", "vertex", "face", *"uvw"], rows)
+    return Table([index, value, *"xyz", "vertex", "face", *"uvw"], rows)
 
 
 _NOTHING = None, None, None

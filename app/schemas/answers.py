@@ -4,6 +4,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field
 
+from app.schemas.meshes import Sample
 from app.schemas.requests import Layout, Method
 
 StepName = Literal["dijkstra", "shorten", "approximate", "backtrace", "exact", "path"]
@@ -170,6 +171,75 @@ class BordersAnswer(BaseModel):
     warnings: list[str]
 
 
+class SamplesAnswer(BaseModel):
+    """Points spread over the surface."""
+
+    kind: Literal["samples"]
+    mesh_id: str
+    points: list[ResolvedPoint]
+    radii: list[float | None] = Field(
+        description="The covering radius with the points of `starts`, and after each one added; "
+        "`null` while a part of the surface has no point"
+    )
+    covering_radius: float | None = Field(
+        description="The distance of the farthest vertex from the nearest point, at the end"
+    )
+    costs: list[float] = Field(
+        description="The sum of squared distances over the surface, before and after each "
+        "iteration; never rising"
+    )
+    converged: bool | None = Field(
+        description="Whether the last iteration moved no point; null if there were none"
+    )
+    distances: list[float | None] | None = Field(
+        default=None, description="For `include`: in mesh units, `null` where unreachable"
+    )
+    nearest: list[int | None] | None = Field(
+        default=None, description="For `include`: index of the nearest point of each vertex"
+    )
+    warnings: list[str]
+
+
+class Neighbours(BaseModel):
+    """Two cells that share a border."""
+
+    sources: tuple[int, int] = Field(description="Indices into `sources`, the lower one first")
+    length: float = Field(description="The length of their border, in mesh units")
+
+
+class CellsAnswer(BaseModel):
+    """The cells of sources."""
+
+    kind: Literal["cells"]
+    mesh_id: str
+    chord_error: float
+    sources: list[ResolvedSource | ResolvedCurveSource]
+    areas: list[float] = Field(
+        description="In mesh units squared; 0 where other sources are nearer everywhere"
+    )
+    centroids: list[ResolvedPoint | None] | None = Field(
+        description="The middle of each cell, `null` for one without area; null if a source is a "
+        "curve"
+    )
+    neighbours: list[Neighbours]
+    warnings: list[str]
+
+
+class MeanAnswer(BaseModel):
+    """The mean of points on the surface: their Karcher mean."""
+
+    kind: Literal["mean"]
+    mesh_id: str
+    points: list[ResolvedPoint]
+    mean: ResolvedPoint
+    variance: float = Field(
+        description="The weighted mean of the squared distances, in mesh units squared"
+    )
+    converged: bool = Field(description="Whether no point near it is better")
+    moves: int = Field(description="How often the search moved")
+    warnings: list[str]
+
+
 class BoundaryDocument(LineDocument):
     """A polyline of boundary edges, with the surface on its left."""
 
@@ -183,6 +253,33 @@ class BoundariesAnswer(BaseModel):
     mesh_id: str
     boundaries: list[BoundaryDocument] = Field(
         description="Closed lines, and open lines that end at an edge of three faces or more"
+    )
+    warnings: list[str]
+
+
+class CutAnswer(BaseModel):
+    """A mesh of which curves are edges, and which is in the store like any other.
+
+    Its arrays tell where all of it was on the mesh that was cut.
+    """
+
+    kind: Literal["cut"]
+    mesh_id: str = Field(description="The mesh that was cut")
+    cut_mesh_id: str = Field(
+        description="The new mesh. For F faces and V vertices it has the arrays `face_of` (F): the "
+        "old face that each is of; `location_faces` (V) and `location_weights` (V, 3): an old face "
+        "that holds each vertex, -1 for none, and the weights in it; `curve_edges` (E, 2): "
+        "vertices of the edges of curves, where they were before the surface came apart; "
+        "`edge_curves` (P, 2): rows of `curve_edges` and the curves that run along them; `copy_of` "
+        "(V): the vertex that each one was before the surface came apart; `parts` (F): the part "
+        "that each face belongs to, bounded by curves"
+    )
+    vertices: int = Field(description="Number of vertices of the new mesh")
+    faces: int = Field(description="Number of faces of the new mesh")
+    parts: int = Field(description="Number of parts that the curves bound")
+    snapped: Sample = Field(
+        description="Points of curves that are within 2**-30 of a vertex or an edge, as a weight, "
+        "and not on it: the curve runs through that instead. Each as a curve and a point of it"
     )
     warnings: list[str]
 

@@ -117,6 +117,11 @@ class MeshDocument(BaseModel):
         description="Warnings of one or two sentences each, with the remedy"
     )
     created: str = Field(description="When the mesh was stored, RFC 3339")
+    cut_from: str | None = Field(
+        default=None,
+        description="For a mesh that was cut along curves: the mesh that it was cut from, which "
+        "its arrays lead back to; see `CutAnswer`",
+    )
     arrays: dict[str, str] = Field(
         description="Paths of its arrays, by name: `lengths` where those of its edges were given, "
         "and no `vertices` without positions"

@@ -8,6 +8,7 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    StrictBool,
     StrictInt,
     Tag,
 )
@@ -160,6 +161,16 @@ class Curve(StrictModel):
         description="Points, each in one face with the next; the `locations` of a path are such "
         "points",
         examples=[[{"vertex": 0}, {"vertex": 1}]],
+    )
+
+
+class CurveToCut(Curve):
+    """A curve that a surface is cut along."""
+
+    closed: StrictBool = Field(
+        default=False,
+        description="Whether the curve leads from its last point back to the first, which is not "
+        "repeated: as `closed` of lines in answers",
     )
 
 

@@ -1,6 +1,6 @@
 """Bodies and parameters of queries."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import (
@@ -13,10 +13,12 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from app.schemas.meshes import MeshName
 from app.schemas.points import (
     MOST_MEMBERS,
     Axis,
     Count,
+    CurveToCut,
     Directions,
     Ends,
     FailFastList,
@@ -43,6 +45,9 @@ def _no_boolean(value: Any) -> Any:
 
 Effort = Annotated[Literal[1, 2, 4, 8], BeforeValidator(_no_boolean)]
 """A number; `Literal` by itself takes `true` for 1"""
+
+
+Iterations = Annotated[StrictInt, Field(ge=0, le=1000)]
 
 
 class Accuracy(StrictModel):
@@ -83,6 +88,8 @@ class QueryBody(StrictModel):
         "levels": "max_levels",
     }
     """Setting that bounds the length of a list, by its name"""
+    arrays: ClassVar[Sequence[str]] = ()
+    """Lists of numbers that may come in numpy's format as well, as parts of a form"""
 
     @model_validator(mode="before")
     @classmethod
@@ -160,6 +167,8 @@ class IsolinesRequest(Accuracy, AskingForLines):
         }
     )
 
+    arrays: ClassVar[Sequence[str]] = ("values",)
+
     method: BoundedMethod = Field(
         default="exact",
         description="`fast` is not available: lines need windows, which it does not have",
@@ -194,6 +203,14 @@ class IsolinesRequest(Accuracy, AskingForLines):
     )
 
 
+_CHORD_ERROR: Any = Field(
+    default=None,
+    description="Largest distance of chords from the exact lines, which are mostly hyperbolas "
+    "inside faces, in mesh units. At least a billionth of the bounding box's diagonal; a "
+    "thousandth of the mean edge length if not given",
+)
+
+
 class BordersRequest(AskingForLines):
     """The borders of the territories of ``sources``; always exact."""
 
@@ -205,18 +222,103 @@ class BordersRequest(AskingForLines):
     max_distance: NonNegative | None = Field(
         default=None, description="Territories, and with them borders, end at this distance"
     )
-    chord_error: Positive | None = Field(
-        default=None,
-        description="Largest distance of the returned chords from the exact lines, which are "
-        "mostly hyperbolas inside faces, in mesh units. At least a billionth of the bounding box's "
-        "diagonal; a thousandth of the mean edge length if not given",
-    )
+    chord_error: Positive | None = _CHORD_ERROR
 
 
 class BoundariesRequest(AskingForLines):
     """The boundary of the surface. Blocked faces are no part of it: their rim is a boundary."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{}]})
+
+
+class SamplesRequest(AmongBarriers):
+    """Points spread over the surface, each the farthest from those before."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [{"count": 20}, {"radius": 0.5, "starts": [{"vertex": 0}], "iterations": 5}]
+        }
+    )
+
+    count: Count | None = Field(
+        default=None, description="The number of points, those of `starts` included"
+    )
+    radius: NonNegative | None = Field(
+        default=None,
+        description="The covering radius to reach, in mesh units. Give at least one of the two; "
+        "the first that is reached counts",
+    )
+    starts: FailFastList[Point] = Field(
+        default=[], description="The points to begin with; vertex 0 if there are none"
+    )
+    iterations: Iterations = Field(
+        default=0,
+        description="How often the points then move to the middle of what is nearest to each, by "
+        "Lloyd's method; fewer if they converge",
+    )
+    include: FailFastList[Literal["distances"]] = Field(
+        default=[],
+        description="`distances`: also the distance of each vertex from the nearest point, and the "
+        "index of that",
+    )
+
+
+class CellsRequest(AmongBarriers):
+    """The cells of ``sources``: what is nearer to each of them than to the others."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"sources": [{"vertex": 0}, {"vertex": 7}]}]}
+    )
+
+    sources: FailFastList[Source] = Field(min_length=1)
+    max_distance: NonNegative | None = Field(
+        default=None, description="Cells end at this distance, in mesh units"
+    )
+    chord_error: Positive | None = _CHORD_ERROR
+
+
+class MeanRequest(AmongBarriers):
+    """The point whose squared distances from ``points`` sum to the least."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"points": [{"vertex": 0}, {"vertex": 7}]}]}
+    )
+
+    points: FailFastList[Point] = Field(min_length=1)
+    weights: FailFastList[NonNegative] | None = Field(
+        default=None, min_length=1, description="One for each point; the same for all if not given"
+    )
+
+
+class CutRequest(QueryBody):
+    """A surface that is cut along ``curves``, which become edges of a new mesh."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {"curves": [{"polyline": [{"vertex": 0}, {"vertex": 1}]}]},
+                {
+                    "curves": [{"polyline": [0, 1, 3], "closed": True}],
+                    "separate": False,
+                    "name": "terrain with a border",
+                },
+            ]
+        }
+    )
+
+    curves: FailFastList[CurveToCut] = Field(
+        min_length=1,
+        description="At least one. They may cross, touch and overlap, end anywhere, pass through "
+        "vertices and run along edges; one of a single point makes that a vertex",
+    )
+    separate: StrictBool = Field(
+        default=True, description="Whether the surface comes apart along the curves"
+    )
+    name: MeshName | None = Field(
+        default=None,
+        description="Name of the new mesh for people; one that is in the store already keeps its "
+        "own",
+    )
 
 
 class Stops(AmongBarriers):

@@ -9,32 +9,42 @@ A query takes these steps, one type for each::
     Result       the body and its ``ResultManifest``, in memory or files      app.store
     TaskResult   the result on its way back, with the seconds it took         app.engine
 
-Task to TaskResult are skipped where the store has the result. A ``Job`` runs the same steps after
+Task to TaskResult are skipped where the store has the result. A cut ends with a mesh in the store,
+and a result that names it. A ``Job`` runs the same steps after
 its request has ended, and records the name of the result.
 """
 
 from collections import Counter, defaultdict
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
+from app.encoding import encode
 from app.engine.interface import Engine, ProgressCallback
 from app.engine.single_flight import SingleFlight
-from app.engine.work import RunQuery, Task, TaskResult
-from app.queries import MatrixQuery, Query, result_key
+from app.engine.work import MeshFromCut, RunQuery, Task, TaskResult
+from app.queries import CutQuery, MatrixQuery, Query, code_version, result_key
 from app.service.matrix_parts import MatrixInParts
+from app.service.mesh_storing import MeshStoring, PhaseSeconds, StoredMesh
 from app.service.progress import ignore_progress
 from app.service.request_context import RequestContext
 from app.service.time_limit import time_limit
 from app.settings import Settings
 from app.store.mesh_catalog import MeshCatalog
-from app.store.results import Result, ResultStore, result_name
+from app.store.results import Result, ResultStore, in_memory_result, result_name
 
-PhaseSeconds = Mapping[str, float]
-"""Seconds of each phase of the work; empty where the store had the answer"""
-Answered = tuple[Result, PhaseSeconds]
-"""A result, to be released to the store of results once it has been sent, and its seconds"""
-_Run = Callable[[ProgressCallback], Awaitable[TaskResult]]
+
+class Answered(NamedTuple):
+    """An answer."""
+
+    result: Result
+    """To be released to the store of results once it has been sent"""
+    seconds: PhaseSeconds
+    mesh: StoredMesh | None = None
+    """The mesh that a cut has made"""
+
+
+_Run = Callable[[ProgressCallback], Awaitable[Answered]]
 """The computation of an answer, which reports its progress"""
 
 
@@ -47,6 +57,7 @@ class Answering:
         catalog: MeshCatalog,
         results: ResultStore,
         engine: Engine,
+        mesh_storing: MeshStoring,
         *,
         is_shared: bool,
     ) -> None:
@@ -54,8 +65,9 @@ class Answering:
         self._settings = settings
         self._catalog = catalog
         self._results = results
+        self._mesh_storing = mesh_storing
         self._is_shared = is_shared
-        self._flights: SingleFlight[TaskResult] = SingleFlight()
+        self._flights: SingleFlight[Answered] = SingleFlight()
         self.lookups = {"hit": 0, "miss": 0}
         """Lookups of results in the store"""
         self.solves: Counter[str] = Counter()
@@ -68,12 +80,10 @@ class Answering:
     ) -> Answered:
         """Return the answer to a query within a deadline, ``as_file`` with files."""
         async with time_limit(self._settings, context.deadline_s):
-            result, seconds = await self.find_or_compute(
-                query, context.caller.name, ignore_progress
-            )
+            found = await self.find_or_compute(query, context.caller.name, ignore_progress)
             if as_file:
-                result = await self._results.with_files(result)
-            return result, seconds
+                found = found._replace(result=await self._results.with_files(found.result))
+            return found
 
     async def find_or_compute(
         self,
@@ -90,18 +100,23 @@ class Answering:
         with self._catalog.pinned(query.mesh_id):
             query.check_answer(self._settings, as_job=is_promised)
             name, run = self._computation(query, client, is_promised=is_promised)
-            # Small work costs less than to look for what another service has computed.
-            if self._is_shared and not query.is_small:
-                await self._results.index(name)
-            stored = await self._results.find(name)
-            self.lookups["miss" if stored is None else "hit"] += 1
+            stored = await self._find(query, name)
             if stored is not None:
-                return stored, {}
+                return Answered(stored, {})
             counted = partial(self._run, run, query.kind)
             done = await self._flights.join(name, counted, on_progress, is_promised=is_promised)
-            assert done.result is not None, "this kind of work answers"  # noqa: S101
-            result = self._results.add(done.result)
-            return result, done.seconds
+            return done._replace(result=self._results.add(done.result))
+
+    async def _find(self, query: Query[Any], name: str) -> Result | None:
+        """Return the stored result of a query; the mesh that a cut made may be gone by now."""
+        if isinstance(query, CutQuery):
+            return None
+        # Small work costs less than to look for what another service has computed.
+        if self._is_shared and not query.is_small:
+            await self._results.index(name)
+        stored = await self._results.find(name)
+        self.lookups["miss" if stored is None else "hit"] += 1
+        return stored
 
     def _computation(
         self, query: Query[Any], client: str, *, is_promised: bool
@@ -112,14 +127,49 @@ class Answering:
             # In parts a sparse matrix has no limit of cells: it is another answer than in memory.
             name = result_name(query.mesh_id, f"{key}.parts")
             parts = MatrixInParts(query, client, name, self.engine, self._results)
-            return name, parts.run
+            return name, _answering(parts.run)
         name = result_name(query.mesh_id, key)
+        if isinstance(query, CutQuery):
+            return name, partial(self._cut, query, name, client, is_promised)
         work = RunQuery(query, name)
         task = Task(work, client, query.affinity_keys, query.is_small, is_promised)
-        return name, partial(self.engine.run, task)
+        return name, _answering(partial(self.engine.run, task))
 
-    async def _run(self, run: _Run, kind: str, on_progress: ProgressCallback) -> TaskResult:
+    async def _cut(
+        self,
+        query: CutQuery,
+        name: str,
+        client: str,
+        is_promised: bool,
+        on_progress: ProgressCallback,
+    ) -> Answered:
+        """Have a mesh cut, and return the answer, which names the new one."""
+        stored = await self._mesh_storing.store(
+            MeshFromCut(query),
+            query.request.name,
+            client,
+            on_progress,
+            affinity_keys=query.affinity_keys,
+            is_promised=is_promised,
+        )
+        answer = query.told(stored.mesh_id, stored.about)
+        parts, headers = encode(answer, query.representation)
+        result = in_memory_result(name, parts, headers, code_version())
+        return Answered(result, stored.seconds, stored)
+
+    async def _run(self, run: _Run, kind: str, on_progress: ProgressCallback) -> Answered:
         done = await run(on_progress)
         self.solves[kind] += 1
         self.solve_seconds[kind] += done.seconds["compute"]
         return done
+
+
+def _answering(run: Callable[[ProgressCallback], Awaitable[TaskResult]]) -> _Run:
+    """Return the computation of an answer by work that ends with a result."""
+
+    async def answered(on_progress: ProgressCallback) -> Answered:
+        done = await run(on_progress)
+        assert done.result is not None, "this kind of work answers"  # noqa: S101
+        return Answered(done.result, done.seconds)
+
+    return answered

@@ -88,8 +88,10 @@ class QueryJobs:
         except BaseException:
             self._abandon(answering)
             raise
-        result, seconds = answering.result()
-        return await self._results.with_files(result) if as_file else result, seconds
+        found = answering.result()
+        if as_file:
+            found = found._replace(result=await self._results.with_files(found.result))
+        return found
 
     async def _hand_over(self, answering: "asyncio.Task[Answered]", job: Job) -> None:
         """Go on with work until a job has joined it."""
@@ -107,7 +109,7 @@ class QueryJobs:
 
     def _release(self, answered: "asyncio.Task[Answered]") -> None:
         if not answered.cancelled() and answered.exception() is None:
-            self._results.release(answered.result()[0])
+            self._results.release(answered.result().result)
 
     async def solve(self, spec: JobSpec, written: bytes, on_progress: ProgressCallback) -> Result:
         """Compute the answer of a job."""
@@ -142,10 +144,10 @@ class QueryJobs:
     ) -> Result:
         """Answer the query of a job, with files, for which room is reserved before."""
         with self._results.reserving(client, self._room(query)):
-            result, _ = await self._answering.find_or_compute(
+            found = await self._answering.find_or_compute(
                 query, client, on_progress, is_promised=True
             )
-            return await self._results.with_files(result)
+            return await self._results.with_files(found.result)
 
     def _room(self, query: Query[Any]) -> int:
         """Return the bytes to reserve for an answer; a matrix in parts reserves its own."""

@@ -1,24 +1,21 @@
 """The parts of a running service, put together, and what it does with meshes."""
 
 import asyncio
-from collections.abc import AsyncIterator, Iterator, Mapping
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
-from dataclasses import dataclass
 from functools import partial
 from gc import collect, freeze
 from pathlib import Path
-from typing import Any
-
-from anyio import to_thread
 
 from app.engine.interface import Engine
 from app.engine.supplied import SuppliedEngine
-from app.engine.work import MeshInput, StoreMesh, Task
+from app.engine.work import MeshInput
 from app.jobs import JobManager, JobRepository, JobRunner, Retention
 from app.queries import MeshSize
 from app.repeating import repeat
-from app.service.answering import Answering, PhaseSeconds
+from app.service.answering import Answering
 from app.service.concurrency import ConcurrencyLimit
+from app.service.mesh_storing import Manifest, MeshStoring, StoredMesh
 from app.service.progress import ignore_progress
 from app.service.query_jobs import QueryJobs
 from app.service.request_context import RequestContext
@@ -41,17 +38,6 @@ _CATALOG_PERIOD_S = 2.0
 
 _JOBS_PERIOD_S = 5.0
 """Seconds between two looks at what others did to jobs, where another process runs them"""
-
-Manifest = Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class StoredMesh:
-    """A mesh that an upload has put into the store, or found there."""
-
-    manifest: Manifest
-    is_new: bool
-    seconds: PhaseSeconds
 
 
 class Service:
@@ -80,6 +66,9 @@ class Service:
         self.fields = FieldStore(settings.folder, settings.fields_bytes)
         self.engine = _engine(settings, self.store)
         self.engine.on_unclaimed = self.results.index_unclaimed
+        self.mesh_storing = MeshStoring(
+            self.scratch, self.mesh_catalog, self.results, self.fields, self.engine
+        )
         repository, ttl_s = JobRepository(self.database), settings.job_ttl
         retention = Retention(self.results, ttl_s)
         self.jobs = JobManager(repository, self.results, retention)
@@ -88,6 +77,7 @@ class Service:
             self.mesh_catalog,
             self.results,
             self.engine,
+            self.mesh_storing,
             is_shared=self.database.is_shared,
         )
         self.query_jobs = QueryJobs(
@@ -194,24 +184,9 @@ class Service:
         self, mesh_input: MeshInput, name: str | None, context: RequestContext
     ) -> StoredMesh:
         """Have a worker read or make a mesh, and store it under a name, if it has one."""
-        async with (
-            self.scratch.folder(context.caller.name) as scratch,
-            time_limit(self.settings, context.deadline_s),
-        ):
-            work = StoreMesh(mesh_input, scratch.path / "mesh", name)
-            task = Task(work, context.caller.name)
-            while True:
-                done = await self.engine.run(task, ignore_progress)
-                written = done.mesh
-                assert written is not None, "this kind of work writes a mesh"  # noqa: S101
-                change = await self.mesh_catalog.add(written)
-                if change is not None:
-                    break
-        for mesh_id in change.evicted:
-            await self._forget(mesh_id)
-        if change.is_healed:
-            await self._forget(written.mesh_id)
-        return StoredMesh(written.manifest, change.is_new, done.seconds)
+        client = context.caller.name
+        async with time_limit(self.settings, context.deadline_s):
+            return await self.mesh_storing.store(mesh_input, name, client, ignore_progress)
 
     async def manifest(self, mesh_id: str) -> Manifest:
         """Return the manifest of a mesh, and mark the mesh as used."""
@@ -231,17 +206,9 @@ class Service:
     async def delete_mesh(self, mesh_id: str) -> None:
         """Remove a mesh and its results; afterwards no service that shares the store has it."""
         await self.mesh_catalog.delete(mesh_id)
-        await self._forget(mesh_id)
+        await self.mesh_storing.forget(mesh_id)
         if self.database.is_shared:
             await asyncio.sleep(self.store.meshes.trusted_s)
-
-    async def _forget(self, mesh_id: str) -> None:
-        """Remove results and fields of a mesh that is gone, or that was damaged.
-
-        Nobody knows which answers came before the damage.
-        """
-        self.results.forget_mesh(mesh_id)
-        await to_thread.run_sync(self.fields.forget_mesh, mesh_id)
 
 
 def _engine(settings: Settings, store: Store) -> Engine:

@@ -13,6 +13,7 @@ from anyio import CapacityLimiter, to_thread
 from app.errors import ProblemError, problem
 from app.store.layout import MESHES
 from app.store.meshes import (
+    CUT_ARRAYS,
     MANIFEST,
     PUBLIC_ARRAYS,
     MeshStore,
@@ -236,5 +237,6 @@ _ABSENT = {
     "lengths": "they are the distances of its vertices",
     "vertex_map": "it keeps the vertices of its file",  # TriangleMesh has no map that moves nothing
     "face_map": "it keeps the faces of its file",
+    **dict.fromkeys(CUT_ARRAYS, "it was not cut from another one"),
 }
 """Why a mesh has no array of a name"""

@@ -3,12 +3,13 @@
 ::
 
     meshes/{id}/manifest.json      report, warnings, name, and the checksum of each array
-    meshes/{id}/{array}.npy        one file for each array of ``TriangleMesh.arrays()``
+    meshes/{id}/{array}.npy        one file for each array of ``TriangleMesh.arrays()``, and of
+                                   ``CUT_ARRAYS`` where the mesh was cut from another one
 
 The id is a hash of the canonical arrays (vertices, faces, both maps), not of the uploaded bytes. So
-the same mesh as PLY, as JSON or as a sample is one entry with one set of results. A later reader
-that gets other arrays from the same file gets another id, so that no stored result is ever taken
-for that of another mesh.
+the same mesh as PLY, as JSON or as a sample is one entry with one set of results. That of a cut
+mesh is a hash of what it was cut from, too. A later reader that gets other arrays from the same
+file gets another id, so that no stored result is ever taken for that of another mesh.
 
 No file is changed once it is written. A process verifies the files of a mesh when it opens it.
 Writing a damaged mesh again replaces its files, and processes that have it open open it anew.
@@ -45,6 +46,17 @@ _CHECKSUM = "checksum"
 FileVersion = tuple[int, int]
 """Inode, and time of the last change in ns"""
 
+CUT_ARRAYS = (
+    "face_of",
+    "location_faces",
+    "location_weights",
+    "curve_edges",
+    "edge_curves",
+    "copy_of",
+    "parts",
+)
+"""Arrays of a cut mesh that lead back to the mesh it was cut from, as `CutMesh` names them"""
+
 PUBLIC_ARRAYS = {
     "vertices": "vertices",
     "faces": "faces",
@@ -52,12 +64,21 @@ PUBLIC_ARRAYS = {
     "vertex_map": "vertex_map",
     "face_map": "face_map",
     "components": "component",
+    **{name: name for name in CUT_ARRAYS},
 }
 """Names of the arrays that clients may read, and the names ``TriangleMesh.arrays`` gives them"""
 
 _ID_BYTES = 16
 _ID = re.compile(f"[0-9a-f]{{{2 * _ID_BYTES}}}")
-_DEFINING_ARRAYS = ("vertices", "faces", "vertex_map", "face_map", "lengths")
+_DEFINING_ARRAYS = ("vertices", "faces", "vertex_map", "face_map", "lengths", *CUT_ARRAYS)
+
+
+@dataclass(frozen=True)
+class CutFrom:
+    """The mesh that another was cut from, and the ``CUT_ARRAYS`` that lead back to it."""
+
+    mesh_id: str
+    arrays: Mapping[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)
@@ -124,14 +145,17 @@ class MeshStore:
         folder: Path,
         name: str | None = None,
         check: Callable[[], None] = lambda: None,
+        cut_from: CutFrom | None = None,
     ) -> WrittenMesh:
         """Write ``mesh`` into a new scratch ``folder``, unless it is intact in the store.
 
         The files survive a power cut. A mesh in the store keeps the ``name`` that it got first, as
         far as its manifest still tells. Before each array ``check`` is called; it may raise.
         """
-        arrays = mesh.arrays()
-        mesh_id = content_hash(arrays)
+        arrays, origin = mesh.arrays(), ""
+        if cut_from is not None:
+            arrays, origin = {**arrays, **cut_from.arrays}, cut_from.mesh_id
+        mesh_id = content_hash(arrays, origin)
         stored: Mapping[str, Any] = {}
         with suppress(ProblemError):  # there is no such mesh, or its manifest is damaged
             stored = self.manifest(mesh_id)
@@ -150,6 +174,8 @@ class MeshStore:
             "warnings": list(mesh.warnings),
             "crc32": checksums,
         }
+        if origin:
+            manifest["cut_from"] = origin
         if stored:
             manifest |= {key: stored.get(key) for key in ("name", "created")}
         (folder / MANIFEST).write_bytes(encode_manifest(manifest))
@@ -172,6 +198,8 @@ class MeshStore:
         manifest, version = self.manifest(mesh_id), self._version(mesh_id)
         arrays = {}
         for name in manifest["crc32"]:
+            if name in CUT_ARRAYS:  # for clients only
+                continue
             self.verify(manifest, name)
             mapped = np.load(self.array_file(mesh_id, name), mmap_mode="r", allow_pickle=False)
             arrays[name] = mapped.view(np.ndarray)
@@ -293,9 +321,9 @@ def require_id(mesh_id: str) -> None:
         raise mesh_not_found(mesh_id)
 
 
-def content_hash(arrays: Mapping[str, NDArray[Any]]) -> str:
-    """Return the id of a mesh with these arrays."""
-    digest = hashlib.blake2b(digest_size=_ID_BYTES)
+def content_hash(arrays: Mapping[str, NDArray[Any]], cut_from: str = "") -> str:
+    """Return the id of a mesh with these arrays, which may have been cut from another mesh."""
+    digest = hashlib.blake2b(cut_from.encode(), digest_size=_ID_BYTES)
     for name in _DEFINING_ARRAYS:
         if name in arrays:
             array = np.ascontiguousarray(arrays[name])

@@ -113,20 +113,27 @@ def write_result(
         first.append(part)
         if sum(map(len, first)) > SMALL:
             return _write(root, name, chain(first, rest), headers, code)
-    body = b"".join(first)
-    manifest = ResultManifest(
-        headers=dict(headers), size=len(body), crc32=zlib.crc32(body), code=code
-    )
-    in_memory = Result(name, manifest, body, has_files=False)
+    in_memory = in_memory_result(name, first, headers, code)
     if is_cheap:
         return in_memory
     try:
-        return replace(_write(root, name, [body], headers, code), body=body)
+        return replace(_write(root, name, first, headers, code), body=in_memory.body)
     except OSError as error:
         if error.errno != errno.EROFS:
             raise
         warn("result not stored", name=name, error=repr(error))
         return in_memory
+
+
+def in_memory_result(
+    name: str, parts: Iterable[Buffer], headers: Mapping[str, str], code: str
+) -> Result:
+    """Return a small result without files, see `write_result`."""
+    body = b"".join(parts)
+    manifest = ResultManifest(
+        headers=dict(headers), size=len(body), crc32=zlib.crc32(body), code=code
+    )
+    return Result(name, manifest, body, has_files=False)
 
 
 def write_result_file(

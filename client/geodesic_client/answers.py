@@ -217,6 +217,51 @@ class Neighbour:
 
 
 @dataclass(frozen=True)
+class Samples:
+    """Points spread over a surface."""
+
+    points: Sequence[Mapping[str, Any]]
+    """N points, as they can be sent again: a vertex, or a face and weights"""
+    positions: Floats
+    """(N, 3), or (0, 3) on a mesh that is given by the lengths of its edges alone"""
+    radii: Floats
+    """Covering radius with the first points, and after each one added; infinite while a part has
+    no point"""
+    costs: Floats
+    """Sum of squared distances before and after each iteration; empty without iterations"""
+    converged: bool | None
+    """Whether the last iteration moved no point; None without iterations"""
+
+
+@dataclass(frozen=True)
+class Cells:
+    """The parts of a surface that are nearest to each of N sources."""
+
+    areas: Floats
+    """(N,), mesh units squared"""
+    centroids: Sequence[Mapping[str, Any] | None] | None
+    """N points, None for a cell without area; None if a source is a curve"""
+    adjacency: Integers
+    """(M, 2), pairs of sources whose cells share a border"""
+    border_lengths: Floats
+    """(M,), mesh units"""
+
+
+@dataclass(frozen=True)
+class Mean:
+    """The mean of points on a surface."""
+
+    point: Mapping[str, Any]
+    """A vertex, or a face and weights"""
+    position: Floats | None
+    """(3,); None on a mesh that is given by the lengths of its edges alone"""
+    variance: float
+    """Mesh units squared"""
+    converged: bool
+    moves: int
+
+
+@dataclass(frozen=True)
 class LogMap:
     """Where each vertex lies as seen from a source: how far, and in which direction."""
 
@@ -247,6 +292,27 @@ class StraightLine:
     """``length``, ``boundary``, ``barrier``, ``vertex`` or ``non_manifold``"""
     end_direction: float
     """Radians at the last point; NaN where directions have no meaning"""
+
+
+SurfaceLine = Path | Isoline | Border | Boundary | StraightLine
+"""A line that a mesh can be cut along, where it has its locations"""
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A mesh that was cut along curves, and is in the store of the service."""
+
+    mesh_id: str
+    """The new mesh, for `Client.mesh`, `Client.array` and all queries"""
+    cut_from: str
+    """The mesh that was cut"""
+    vertices: int
+    faces: int
+    parts: int
+    """Number of parts that the curves bound"""
+    snapped: int
+    """Points of curves that were nearly on a vertex or an edge, and moved there"""
+    warnings: Sequence[str]
 
 
 @dataclass(frozen=True)
@@ -375,6 +441,20 @@ def to_boundaries(response: httpx2.Response) -> list[Boundary]:
     ]
 
 
+def to_cut(response: httpx2.Response) -> Cut:
+    """Return a cut mesh."""
+    answer = response.json()
+    return Cut(
+        mesh_id=answer["cut_mesh_id"],
+        cut_from=answer["mesh_id"],
+        vertices=answer["vertices"],
+        faces=answer["faces"],
+        parts=answer["parts"],
+        snapped=answer["snapped"]["count"],
+        warnings=answer["warnings"],
+    )
+
+
 def to_matrix(response: httpx2.Response) -> Matrix:
     """Return a matrix, from numpy's formats."""
     bound = ErrorBound(**_members_of_headers(response)["error_bound"])
@@ -404,6 +484,54 @@ def to_stored_matrix(job_id: str, response: httpx2.Response) -> StoredMatrix:
 def to_neighbours(response: httpx2.Response) -> list[Neighbour]:
     """Return the nearest candidates, nearest first."""
     return [Neighbour(each["candidate"], each["distance"]) for each in response.json()["nearest"]]
+
+
+def to_samples(response: httpx2.Response) -> Samples:
+    """Return points that were spread, from JSON."""
+    members = response.json()
+    radii = [np.inf if radius is None else radius for radius in members["radii"]]
+    return Samples(
+        points=[_as_point(each) for each in members["points"]],
+        positions=_positions_of(members["points"]),
+        radii=np.array(radii),
+        costs=np.array(members["costs"], np.float64),
+        converged=members["converged"],
+    )
+
+
+def to_cells(response: httpx2.Response) -> Cells:
+    """Return cells, from JSON."""
+    members = response.json()
+    centroids, pairs = members["centroids"], members["neighbours"]
+    return Cells(
+        areas=np.array(members["areas"], np.float64),
+        centroids=centroids and [each and _as_point(each) for each in centroids],
+        adjacency=np.array([pair["sources"] for pair in pairs], np.int64).reshape(-1, 2),
+        border_lengths=np.array([pair["length"] for pair in pairs], np.float64),
+    )
+
+
+def to_mean(response: httpx2.Response) -> Mean:
+    """Return the mean of points, from JSON."""
+    members = response.json()
+    positions = _positions_of([members["mean"]])
+    return Mean(
+        point=_as_point(members["mean"]),
+        position=positions[0] if len(positions) else None,
+        variance=members["variance"],
+        converged=members["converged"],
+        moves=members["moves"],
+    )
+
+
+def _as_point(described: Mapping[str, Any]) -> Mapping[str, Any]:
+    names = "vertex", "face", "barycentric"
+    return {name: described[name] for name in names if described.get(name) is not None}
+
+
+def _positions_of(described: Sequence[Mapping[str, Any]]) -> Floats:
+    positions = [each["position"] for each in described if each["position"] is not None]
+    return np.array(positions, np.float64).reshape(-1, 3)
 
 
 def to_log_map(response: httpx2.Response) -> LogMap:

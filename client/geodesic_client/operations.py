@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from io import BytesIO
 from os import PathLike
 from pathlib import Path as FilePath
 from typing import Any, Literal, TypeVar
@@ -19,6 +20,8 @@ from geodesic_client.answers import (
     NPZ,
     Border,
     Boundary,
+    Cells,
+    Cut,
     Distances,
     Isolines,
     Job,
@@ -26,15 +29,20 @@ from geodesic_client.answers import (
     LocatedPoint,
     LogMap,
     Matrix,
+    Mean,
     Mesh,
     Neighbour,
     Path,
+    Samples,
     Step,
     StoredMatrix,
     StraightLine,
+    SurfaceLine,
     to_array,
     to_borders,
     to_boundaries,
+    to_cells,
+    to_cut,
     to_distances,
     to_isolines,
     to_job,
@@ -43,10 +51,12 @@ from geodesic_client.answers import (
     to_located,
     to_log_map,
     to_matrix,
+    to_mean,
     to_mesh,
     to_neighbours,
     to_path,
     to_paths,
+    to_samples,
     to_steps,
     to_stored_matrix,
 )
@@ -73,13 +83,31 @@ Kind = Literal[
     "isolines",
     "borders",
     "boundaries",
+    "cut",
+    "samples",
+    "cells",
+    "mean",
     "matrix",
     "nearest",
     "log-map",
     "trace",
     "locate",
 ]
-ArrayName = Literal["vertices", "faces", "lengths", "vertex_map", "face_map", "components"]
+ArrayName = Literal[
+    "vertices",
+    "faces",
+    "lengths",
+    "vertex_map",
+    "face_map",
+    "components",
+    "face_of",
+    "location_faces",
+    "location_weights",
+    "curve_edges",
+    "edge_curves",
+    "copy_of",
+    "parts",
+]
 
 _PART_BYTES = 2**23
 """Bytes of a stored matrix that are read at a time"""
@@ -288,7 +316,6 @@ def isolines(
     """
     body = _body(
         sources=None if sources is None else as_points(sources),
-        values=None if values is None else _with_none(values),
         levels=levels,
         count=count,
         method=method,
@@ -299,7 +326,9 @@ def isolines(
         barriers=barriers,
         include=include,
     )
-    return (yield from _ask(mesh, "isolines", body, to_isolines, progress))
+    arrays = {} if values is None else {"values": np.asarray(values, np.float64)}
+    request = _request(mesh, "isolines", body, JSON, arrays=arrays)
+    return (yield from answer(Query(request, to_isolines), progress))
 
 
 def borders(
@@ -333,6 +362,34 @@ def boundaries(
     """Return the boundary of the surface, longest line first; none for a closed surface."""
     body = _body(barriers=barriers, include=include)
     return (yield from _ask(mesh, "boundaries", body, to_boundaries, progress))
+
+
+def cut(
+    mesh: Mesh | str,
+    curves: SurfaceLine | Sequence[SurfaceLine | Sequence[Point]],
+    *,
+    separate: bool = True,
+    name: str | None = None,
+    progress: Progress = ignore_progress,
+) -> Flow[Cut]:
+    """Cut a mesh along curves, which are edges of a new mesh in the store; return that.
+
+    Curves are lines of other answers that have their locations, or lists of points, each in one
+    face with the next. With ``separate`` the surface comes apart along them. `array` returns the
+    arrays that lead back to the old mesh: ``face_of``, ``location_faces``, ``location_weights``,
+    ``curve_edges``, ``edge_curves``, ``copy_of`` and ``parts``.
+    """
+    given = [curves] if isinstance(curves, SurfaceLine) else curves
+    body = _body(curves=list(map(_as_curve, given)), separate=separate, name=name)
+    return (yield from _ask(mesh, "cut", body, to_cut, progress))
+
+
+def _as_curve(curve: SurfaceLine | Sequence[Point]) -> dict[str, Any]:
+    if not isinstance(curve, SurfaceLine):
+        return {"polyline": curve}
+    if not len(curve.locations):
+        raise ValueError('a line has no locations: ask for it with include=["locations"]')
+    return {"polyline": curve.locations, "closed": getattr(curve, "closed", False)}
 
 
 def matrix(
@@ -459,6 +516,59 @@ def nearest(
     return (yield from _ask(mesh, "nearest", body, to_neighbours, progress))
 
 
+def samples(
+    mesh: Mesh | str,
+    count: int | None = None,
+    *,
+    radius: float | None = None,
+    start: Point | Sequence[Point] = (),
+    iterations: int = 0,
+    barriers: Sequence[int] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[Samples]:
+    """Return points spread over a surface, each the farthest from those before.
+
+    Until there are ``count`` of them, or every vertex is within ``radius`` of one. They then move
+    ``iterations`` times to the middle of what is nearest to each.
+    """
+    body = _body(count=count, radius=radius, iterations=iterations, barriers=barriers)
+    body["starts"] = as_points(start)
+    return (yield from _ask(mesh, "samples", body, to_samples, progress))
+
+
+def cells(
+    mesh: Mesh | str,
+    sources: Sequence[Point],
+    *,
+    max_distance: float | None = None,
+    chord_error: float | None = None,
+    barriers: Sequence[int] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[Cells]:
+    """Return areas, centroids and neighbours of what is nearest to each source."""
+    body = _body(
+        sources=sources,
+        max_distance=max_distance,
+        chord_error=chord_error,
+        barriers=barriers,
+    )
+    return (yield from _ask(mesh, "cells", body, to_cells, progress))
+
+
+def mean(
+    mesh: Mesh | str,
+    points: Sequence[Point],
+    weights: ArrayLike | None = None,
+    *,
+    barriers: Sequence[int] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[Mean]:
+    """Return the point whose squared distances from some points sum to the least."""
+    given = None if weights is None else np.asarray(weights, np.float64)
+    body = _body(points=as_points(points), weights=given, barriers=barriers)
+    return (yield from _ask(mesh, "mean", body, to_mean, progress))
+
+
 def log_map(
     mesh: Mesh | str,
     source: Point,
@@ -566,9 +676,12 @@ def _request(
     body: Mapping[str, Any],
     media_type: str,
     parameters: Mapping[str, str] | None = None,
+    arrays: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> Request:
     content = json.dumps(body, default=_as_json, allow_nan=False).encode()
     headers = {"Content-Type": JSON, "Accept": media_type}
+    if arrays:
+        headers["Content-Type"], content = _as_form(content, arrays)
     return Request("POST", f"{_link(mesh)}/{kind}", parameters or {}, headers, content)
 
 
@@ -576,10 +689,15 @@ def _body(**members: Any) -> dict[str, Any]:
     return {name: value for name, value in members.items() if value is not None}
 
 
-def _with_none(values: ArrayLike) -> list[float | None]:
-    """Return numbers as JSON has them: None where they are not finite."""
-    numbers = np.asarray(values, np.float64)
-    return [each if np.isfinite(each) else None for each in numbers.tolist()]
+def _as_form(content: bytes, arrays: Mapping[str, NDArray[np.float64]]) -> tuple[str, bytes]:
+    """Return JSON and arrays in numpy's format as a form: its Content-Type, and its bytes."""
+    parts: dict[str, tuple[None, bytes, str]] = {"request": (None, content, JSON)}
+    for name, array in arrays.items():
+        file = BytesIO()
+        np.save(file, array, allow_pickle=False)
+        parts[name] = None, file.getvalue(), NPY
+    form = httpx2.Request("POST", "http://localhost", files=parts)  # which encodes it
+    return form.headers["Content-Type"], form.read()
 
 
 def _as_json(value: Any) -> Any:
@@ -631,11 +749,15 @@ class Operations:
     isolines = Method(isolines)
     borders = Method(borders)
     boundaries = Method(boundaries)
+    cut = Method(cut)
     matrix = Method(matrix)
     store_matrix = Method(store_matrix)
     matrix_rows = Method(matrix_rows)
     save_matrix = Method(save_matrix)
     nearest = Method(nearest)
+    samples = Method(samples)
+    cells = Method(cells)
+    mean = Method(mean)
     log_map = Method(log_map)
     trace = Method(trace)
     locate = Method(locate)

@@ -152,6 +152,30 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/meshes/{mesh_id}/cut": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * The mesh cut along curves, as a new mesh
+         * @description Make a mesh of which the curves are edges, and store it like an upload.
+         *
+         *     The `locations` of paths, isolines, borders, boundaries and traces can be curves. Old vertices keep their
+         *     numbers; faces that no curve meets stay as they are. The new mesh has arrays that lead back to the old one,
+         *     and its id is a hash of these, too.
+         */
+        post: operations["cutMesh"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/meshes/{mesh_id}/matrix": {
         parameters: {
             query?: never;
@@ -842,6 +866,121 @@ export interface components {
              *     ]
              */
             polyline: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[];
+        };
+        /**
+         * CurveToCut
+         * @description A curve that a surface is cut along.
+         */
+        CurveToCut: {
+            /**
+             * Polyline
+             * @description Points, each in one face with the next; the `locations` of a path are such points
+             * @example [
+             *       {
+             *         "vertex": 0
+             *       },
+             *       {
+             *         "vertex": 1
+             *       }
+             *     ]
+             */
+            polyline: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[];
+            /**
+             * Closed
+             * @description Whether the curve leads from its last point back to the first, which is not repeated: as `closed` of lines in answers. Default: `false`
+             */
+            closed?: boolean;
+        };
+        /**
+         * CutAnswer
+         * @description A mesh of which curves are edges, and which is in the store like any other.
+         *
+         *     Its arrays tell where all of it was on the mesh that was cut.
+         */
+        CutAnswer: {
+            /**
+             * Kind
+             * @constant
+             */
+            kind: "cut";
+            /**
+             * Mesh Id
+             * @description The mesh that was cut
+             */
+            mesh_id: string;
+            /**
+             * Cut Mesh Id
+             * @description The new mesh. For F faces and V vertices it has the arrays `face_of` (F): the old face that each is of; `location_faces` (V) and `location_weights` (V, 3): an old face that holds each vertex, -1 for none, and the weights in it; `curve_edges` (E, 2): vertices of the edges of curves, where they were before the surface came apart; `edge_curves` (P, 2): rows of `curve_edges` and the curves that run along them; `copy_of` (V): the vertex that each one was before the surface came apart; `parts` (F): the part that each face belongs to, bounded by curves
+             */
+            cut_mesh_id: string;
+            /**
+             * Vertices
+             * @description Number of vertices of the new mesh
+             */
+            vertices: number;
+            /**
+             * Faces
+             * @description Number of faces of the new mesh
+             */
+            faces: number;
+            /**
+             * Parts
+             * @description Number of parts that the curves bound
+             */
+            parts: number;
+            /** @description Points of curves that are within 2**-30 of a vertex or an edge, as a weight, and not on it: the curve runs through that instead. Each as a curve and a point of it */
+            snapped: components["schemas"]["Sample"];
+            /** Warnings */
+            warnings: string[];
+        };
+        /**
+         * CutRequest
+         * @description A surface that is cut along ``curves``, which become edges of a new mesh.
+         * @example {
+         *       "curves": [
+         *         {
+         *           "polyline": [
+         *             {
+         *               "vertex": 0
+         *             },
+         *             {
+         *               "vertex": 1
+         *             }
+         *           ]
+         *         }
+         *       ]
+         *     }
+         * @example {
+         *       "curves": [
+         *         {
+         *           "closed": true,
+         *           "polyline": [
+         *             0,
+         *             1,
+         *             3
+         *           ]
+         *         }
+         *       ],
+         *       "name": "terrain with a border",
+         *       "separate": false
+         *     }
+         */
+        CutRequest: {
+            /**
+             * Curves
+             * @description At least one. They may cross, touch and overlap, end anywhere, pass through vertices and run along edges; one of a single point makes that a vertex
+             */
+            curves: components["schemas"]["CurveToCut"][];
+            /**
+             * Separate
+             * @description Whether the surface comes apart along the curves. Default: `true`
+             */
+            separate?: boolean;
+            /**
+             * Name
+             * @description Name of the new mesh for people; one that is in the store already keeps its own
+             */
+            name?: string | null;
         };
         /**
          * DistancesAnswer
@@ -1806,6 +1945,11 @@ export interface components {
              * @description When the mesh was stored, RFC 3339
              */
             created: string;
+            /**
+             * Cut From
+             * @description For a mesh that was cut along curves: the mesh that it was cut from, which its arrays lead back to; see `CutAnswer`
+             */
+            cut_from?: string | null;
             /**
              * Arrays
              * @description Paths of its arrays, by name: `lengths` where those of its edges were given, and no `vertices` without positions
@@ -3205,7 +3349,7 @@ export interface operations {
             };
         };
         responses: {
-            /** @description The steps, in order. In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` names what is too long for one */
+            /** @description The steps, in order */
             200: {
                 headers: {
                     Vary: components["headers"]["Vary"];
@@ -3424,6 +3568,14 @@ export interface operations {
         requestBody: {
             content: {
                 "application/json": components["schemas"]["IsolinesRequest"];
+                "multipart/form-data": {
+                    request: components["schemas"]["IsolinesRequest"];
+                    /**
+                     * Format: binary
+                     * @description A list of numbers in numpy's format (`.npy`)
+                     */
+                    values?: string;
+                };
             };
         };
         responses: {
@@ -3701,6 +3853,133 @@ export interface operations {
                     "application/json": string;
                     "model/obj": string;
                     "text/csv": string;
+                };
+            };
+            /** @description malformed_body, idempotency_key_unused, malformed_request */
+            400: components["responses"]["Problem"];
+            /** @description unauthorized */
+            401: components["responses"]["Unauthorized"];
+            /** @description origin_not_allowed */
+            403: components["responses"]["Problem"];
+            /** @description mesh_not_found */
+            404: components["responses"]["Problem"];
+            /** @description not_acceptable */
+            406: components["responses"]["Problem"];
+            /** @description upload_too_large, result_too_large */
+            413: components["responses"]["Problem"];
+            /** @description unsupported_media_type */
+            415: components["responses"]["Problem"];
+            /** @description range_not_satisfiable */
+            416: components["responses"]["Problem"];
+            /** @description host_not_allowed */
+            421: components["responses"]["Problem"];
+            /** @description invalid_point, not_embedded, invalid_request, limit_exceeded, memory_limit */
+            422: components["responses"]["Problem"];
+            /** @description quota_exceeded, rate_limited */
+            429: components["responses"]["ProblemForNow"];
+            /** @description header_too_large */
+            431: components["responses"]["Problem"];
+            /** @description worker_died, mesh_damaged, internal_error */
+            500: components["responses"]["Problem"];
+            /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
+            503: components["responses"]["ProblemForNow"];
+            /** @description deadline_exceeded */
+            504: components["responses"]["Problem"];
+            /** @description storage_full, quota_exceeded */
+            507: components["responses"]["Problem"];
+        };
+    };
+    cutMesh: {
+        parameters: {
+            query?: {
+                /** @description Overrides `Accept` */
+                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv";
+                /** @description Type of the numbers in `npy`, `npz` and `octets` */
+                dtype?: "float64" | "float32";
+            };
+            header?: {
+                /** @description The longest time that the client waits, in milliseconds; it bounds no job */
+                "x-timeout-ms"?: number;
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
+                prefer?: string;
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job. With `Prefer: respond-async` only */
+                "idempotency-key"?: string;
+                /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
+                Range?: string;
+            };
+            path: {
+                mesh_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["CutRequest"];
+            };
+        };
+        responses: {
+            /** @description The mesh was in the store already */
+            200: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    Location: components["headers"]["Location"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CutAnswer"];
+                };
+            };
+            /** @description The mesh is new in the store */
+            201: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    Location: components["headers"]["Location"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CutAnswer"];
+                };
+            };
+            /** @description With `Prefer: respond-async`: the job */
+            202: {
+                headers: {
+                    Location: components["headers"]["Location"];
+                    "Preference-Applied": components["headers"]["Preference-Applied"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobDocument"];
+                };
+            };
+            /** @description The requested range */
+            206: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Content-Range": components["headers"]["Content-Range"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": string;
                 };
             };
             /** @description malformed_body, idempotency_key_unused, malformed_request */

@@ -12,7 +12,7 @@ from geodesic_core.cutting.locations import Locations, weights_in
 from geodesic_core.cutting.separation import parts_of
 from geodesic_core.cutting.shapes import lengths_of, sides_of
 from geodesic_core.errors import InvalidArgument
-from geodesic_core.fields.sources import as_given, each_of
+from geodesic_core.mesh.canonical import as_given, each_of
 from geodesic_core.mesh.surface_point import Points, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.reprs import as_table

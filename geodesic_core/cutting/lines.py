@@ -27,6 +27,10 @@ class Line(NamedTuple):
     """Whether a segment leads from the last point to the first"""
 
 
+NO_LINE = Line(np.empty(0, np.int64), np.empty((0, 3)), np.empty(0, np.int64), closed=False)
+"""A line of no points, along which nothing is cut."""
+
+
 def as_line(mesh: TriangleMesh, curve: object, name: str, control: Control) -> Line:
     """Return a curve as a line; ``name`` is how messages call it.
 

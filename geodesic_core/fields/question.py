@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats
 from geodesic_core.control import Control
-from geodesic_core.fields.sources import Nodes, as_sources, component_of, each_of, nodes_of
+from geodesic_core.fields.sources import Nodes, as_sources, component_of, nodes_of
 from geodesic_core.kernels.front.bounds import Bounds, with_parallel_windows
+from geodesic_core.mesh.canonical import each_of
 from geodesic_core.mesh.curve import Polyline, polylines_from_arrays, polylines_to_arrays
 from geodesic_core.mesh.surface_curve import Sources
 from geodesic_core.mesh.surface_point import Curve, Points, Source, SurfacePoint

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from geodesic_core import plotting
 from geodesic_core.arrays import Floats
 from geodesic_core.errors import InvalidArgument
-from geodesic_core.fields.sources import as_given, each_of
 from geodesic_core.kernels.curves.chains import link_crossing_chains
 from geodesic_core.kernels.curves.level_sets import chain_level_set
+from geodesic_core.mesh.canonical import as_given, each_of
 from geodesic_core.mesh.surface_curve import SurfaceCurve, curves_of, draw_over
 from geodesic_core.mesh.surface_point import Point, Points
 from geodesic_core.mesh.triangle_mesh import TriangleMesh

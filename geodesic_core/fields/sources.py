@@ -15,7 +15,7 @@ from geodesic_core.fields.vertex_points import VertexPoints
 from geodesic_core.kernels.front.state import NO_SITES, NODE, SEGMENT, SEGMENT_ENDS, SITE, Sites
 from geodesic_core.kernels.mesh.half_edges import TAIL
 from geodesic_core.mesh.barriers import walled_in
-from geodesic_core.mesh.canonical import half_edges_around, remedy
+from geodesic_core.mesh.canonical import each_of, half_edges_around
 from geodesic_core.mesh.curve import (
     Polyline,
     SegmentInFace,
@@ -25,7 +25,7 @@ from geodesic_core.mesh.curve import (
 )
 from geodesic_core.mesh.edge_lengths import flat_points
 from geodesic_core.mesh.surface_curve import SurfaceCurve, as_written
-from geodesic_core.mesh.surface_point import UNPLACED, Curve, Point, Points, Source, SurfacePoint
+from geodesic_core.mesh.surface_point import UNPLACED, Curve, Points, Source, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.validation import is_number, unboxed
 
@@ -287,29 +287,6 @@ def _warn_of_walled_in(mesh: TriangleMesh, sources: Sequence[SurfacePoint]) -> N
     verb, them = ("lies", "it") if len(found) == 1 else ("lie", "them")
     message = f"{'; '.join(names)}, {verb} in blocked faces only: no path leaves {them}"
     warnings.warn(message, BlockedSource, stacklevel=2)
-
-
-def each_of(points: Points, name: str) -> Iterable[Point]:
-    """Return one point or several as several; ``name`` is how messages call one of them.
-
-    Raises
-    ------
-    InvalidArgument
-        They are neither.
-    """
-    points = unboxed(points)
-    if isinstance(points, SurfacePoint | int | np.integer) and not isinstance(points, bool):
-        return [points]
-    if isinstance(points, str | bytes) or not isinstance(points, Iterable):
-        raise InvalidArgument(
-            f"{name}s is {points!r}; it must be a point, or a sequence of points{remedy(points)}"
-        )
-    return points
-
-
-def as_given(points: Points, found: Any) -> Any:
-    """Return what was found of each of some points: by itself where one point was given."""
-    return found[0] if isinstance(unboxed(points), SurfacePoint | int | np.integer) else found
 
 
 def as_points(

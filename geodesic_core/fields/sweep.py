@@ -15,7 +15,7 @@ from geodesic_core.kernels.front.state import PREDECESSOR, Merges, Wavefront
 from geodesic_core.kernels.mesh.half_edges import Topology
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.paths.backtracing import NO_END, Winners
-from geodesic_core.kernels.sweep import continuous_dijkstra, site_targets
+from geodesic_core.kernels.sweep import continuous_dijkstra, further_sources, site_targets
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
 _FIRST_BUDGET = 1_000_000
@@ -92,12 +92,39 @@ def sweep_nodes(
         wave, outcome = sweep(wave, without_merging(bounds))
         wave.vertices.reference[:] = -1 - wave.vertices.winner_ints[:, PREDECESSOR]
     if outcome == Outcome.RUNAWAY:
-        half_edge = wave.queues.ring[wave.counters[counters.RING_HEAD]]
-        raise InternalError(
-            f"the sweep does not end: its windows go in circles through face "
-            f"{topology.outer_face[half_edge // 3]}; please report this mesh, and use "
-            f"fast_distance for it"
-        )
+        raise _endless(topology, wave)
+    return wave
+
+
+def _endless(topology: Topology, wave: Wavefront) -> InternalError:
+    """Return the error of an exact sweep one of whose lists has come up too often."""
+    half_edge = wave.queues.ring[wave.counters[counters.RING_HEAD]]
+    return InternalError(
+        f"the sweep does not end: its windows go in circles through face "
+        f"{topology.outer_face[half_edge // 3]}; please report this mesh, and use "
+        f"fast_distance for it"
+    )
+
+
+def add_source(
+    mesh: TriangleMesh, wave: Wavefront, vertex: int, index: int, bounds: Bounds, control: Control
+) -> Wavefront:
+    """Extend an exact sweep that has finished by a source, an inner vertex; return its state.
+
+    Distances and nearest sources are then as if it had been among the sources before. O(windows of
+    the part that is nearer to it).
+
+    Raises
+    ------
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As the control says.
+    InternalError
+        As in `sweep_nodes`.
+    """
+    further_sources.add_source(mesh.topology, wave, bounds, vertex, index)
+    wave, outcome = run_sweep(mesh, wave, bounds, control, lambda _: 0.0)
+    if outcome == Outcome.RUNAWAY:
+        raise _endless(mesh.topology, wave)
     return wave
 
 

@@ -88,6 +88,11 @@ class WholeSweep(ABC):
         return self
 
     @property
+    def bounds(self) -> Bounds:
+        """The bounds of the sweep."""
+        return self.question.bounds(self._bounds())
+
+    @property
     def all_faces(self) -> Flags:
         """Flags (F,), by inner face, that are all set."""
         return np.ones(len(self.question.mesh.topology.links) // 3, np.bool_)
@@ -107,8 +112,7 @@ class WholeSweep(ABC):
         Cancelled, DeadlineExceeded, MemoryLimitExceeded
             As in `run_sweep`; the memory of `face_windows_of` counts as well.
         """
-        question = self.question
-        bounds = question.bounds(self._bounds())
+        question, bounds = self.question, self.bounds
         mesh, nodes, limit = question.mesh, question.nodes, question.max_distance
         merges = bool(bounds.merging)
         wave = state.new_wavefront(

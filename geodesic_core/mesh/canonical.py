@@ -6,17 +6,17 @@ other are one.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
-from geodesic_core.errors import InvalidPoint
+from geodesic_core.errors import InvalidArgument, InvalidPoint
 from geodesic_core.kernels.mesh.half_edges import APEX, HEAD, Topology, next_around, previous
-from geodesic_core.mesh.surface_point import Curve, Source, SurfacePoint
+from geodesic_core.mesh.surface_point import Curve, Point, Points, Source, SurfacePoint
 from geodesic_core.tolerances import EDGE_STEPS, ROUNDED_SUM, WEIGHT, WEIGHT_ERROR
-from geodesic_core.validation import is_index, is_number
+from geodesic_core.validation import is_index, is_number, unboxed
 
 
 def at_vertex(topology: Topology, faces: Ints, vertex: int) -> SurfacePoint:
@@ -199,3 +199,26 @@ def half_edges_around(links: Ints, h: int) -> Iterator[int]:
         g = int(next_around(links, g))
         if g < 0 or g == h:
             return
+
+
+def each_of(points: Points, name: str) -> Iterable[Point]:
+    """Return one point or several as several; ``name`` is how messages call one of them.
+
+    Raises
+    ------
+    InvalidArgument
+        They are neither.
+    """
+    points = unboxed(points)
+    if isinstance(points, SurfacePoint | int | np.integer) and not isinstance(points, bool):
+        return [points]
+    if isinstance(points, str | bytes) or not isinstance(points, Iterable):
+        raise InvalidArgument(
+            f"{name}s is {points!r}; it must be a point, or a sequence of points{remedy(points)}"
+        )
+    return points
+
+
+def as_given(points: Points, found: Any) -> Any:
+    """Return what was found of each of some points: by itself where one point was given."""
+    return found[0] if isinstance(unboxed(points), SurfacePoint | int | np.integer) else found

@@ -481,6 +481,19 @@ class TriangleMesh:
         return inner
 
     @cached_property
+    def face_areas(self) -> Floats:
+        """(F,) float64, mesh units squared: area of each face; 0 of one that is not in the surface.
+
+        By the lengths of its edges where these were given.
+        """
+        geometry = self.topology.geometry[::3]
+        areas = np.zeros(len(self.faces))
+        areas[self.topology.outer_face] = (
+            0.5 * geometry[:, LENGTH] * geometry[:, LENGTH_LEFT] * geometry[:, SIN_LEFT]
+        )
+        return areas
+
+    @cached_property
     def is_rough(self) -> bool:
         """Whether it has enough sharp saddles that merging windows saves no time.
 
@@ -586,11 +599,8 @@ class TriangleMesh:
         """
         if self.lengths is None:
             return self.diagonal
-        geometry = self.topology.geometry[::3]
-        twice_areas = geometry[:, LENGTH] * geometry[:, LENGTH_LEFT] * geometry[:, SIN_LEFT]
-        return max(
-            math.sqrt(float(twice_areas.sum())), float(self.topology.geometry[:, LENGTH].max())
-        )
+        longest = float(self.topology.geometry[:, LENGTH].max())
+        return max(math.sqrt(2.0 * float(self.face_areas.sum())), longest)
 
     @cached_property
     def origin(self) -> Floats:

@@ -692,6 +692,48 @@ def test_isolines_are_drawn(run: Run, plane: Path) -> None:
     assert rough.figure("error bound") == "0.001 (relative, guaranteed)"
 
 
+def test_a_mesh_is_cut_along_lines_of_files(run: Run, plane: Path) -> None:
+    mesh = gc.load_mesh(plane)
+    assert run("path", plane, "--source", 0, "--target", 120, "--out", "path.json").code == 0
+    ring = ("isolines", plane, "--source", 60, "--level", 0.3, "--locations")
+    assert run(*ring, "--out", "ring.json").code == 0
+    along = ("--along", "@path.json", "--along", "@ring.json", "--along", "0/1")
+    path, rings = gc.shortest_path(mesh, 0, 120), gc.exact_distance(mesh, 60, retain="windows")
+    lines = [path, *rings.isolines([0.3])[0], gc.Curve([0, 1])]
+    own = gc.cut(mesh, lines)
+    ran = run("cut", plane, *along, "--out", "cut.npz")
+    assert ran.figure("cut") == f"{len(own.vertices)} vertices, {len(own.faces)} faces"
+    assert ran.figure("parts") == str(own.parts.max() + 1)
+    with np.load("cut.npz") as arrays:
+        for name in ("vertices", "faces", "face_of", "location_faces", "curve_edges", "parts"):
+            np.testing.assert_array_equal(arrays[name], getattr(own, name))
+    assert run("cut", plane, *along, "--out", "cut.ply").code == 0
+    np.testing.assert_array_equal(gc.load_mesh("cut.ply").vertices, own.vertices)
+    whole = run("cut", plane, *along, "--whole", "--json")
+    assert json.loads(whole.out)["vertices"] == len(gc.cut(mesh, lines, False).vertices)
+    nearly = f"0/f0:{1 - 2.0**-31!r},{2.0**-31!r},0"
+    assert run("cut", plane, "--along", nearly).figure("snapped").startswith("1 points")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--along", "0/999"], "--along 0/999: vertex 999 does not exist"),
+        (["--along", "0/60"], "--along 0/60: shares no face with the point before it"),
+        (["--along", "@none.json"], "cannot read none.json"),
+        (["--along", "@plane.ply"], "plane.ply is not JSON"),
+        (["--along", "@line.json"], "line.json has no lines with locations"),
+        (["--along", "0/1", "--out", "-"], "- must end in .ply, .npz or .json"),
+        (["--along", "0/1", "--out", "c.obj"], "c.obj must end in .ply, .npz or .json"),
+    ],
+)
+def test_cuts_that_are_refused(run: Run, plane: Path, arguments: list[str], message: str) -> None:
+    Path("line.json").write_text('{"isolines": [{"level": 1, "lines": []}]}')
+    ran = run("cut", plane, *arguments)
+    assert ran.code != 0
+    assert message in ran.err
+
+
 def test_isolines_of_values_and_boundaries(run: Run, plane: Path) -> None:
     mesh = gc.load_mesh(plane)
     values = mesh.vertices[:, 0] - mesh.vertices[:, 1] ** 2

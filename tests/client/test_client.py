@@ -116,6 +116,25 @@ def test_paths_are_the_library_s(service: Client, mesh: Mesh, same: gc.TriangleM
     assert other.reason is None
 
 
+def test_a_mesh_is_cut_along_lines_of_answers(
+    service: Client, mesh: Mesh, same: gc.TriangleMesh
+) -> None:
+    path = service.path(mesh, 3, 700)
+    rings = service.isolines(mesh, [40], levels=[0.5], include=["locations"]).levels[0].lines
+    cut = service.cut(mesh, [path, *rings, [0]], name="in parts")
+    own_rings = gc.exact_distance(same, 40, retain="windows").isolines([0.5])[0]
+    own = gc.cut(same, [gc.shortest_path(same, 3, 700), *own_rings, gc.Curve([0])])
+    assert (cut.cut_from, cut.snapped, cut.parts) == (mesh.id, 0, own.parts.max() + 1)
+    assert (cut.vertices, cut.faces) == (len(own.vertices), len(own.faces))
+    assert (service.mesh(cut.mesh_id).name, cut.warnings) == ("in parts", [])
+    for name in ("vertices", "faces", "face_of", "location_weights", "parts"):
+        np.testing.assert_array_equal(service.array(cut.mesh_id, name), getattr(own, name))
+    whole = service.cut(mesh, path, separate=False)
+    assert whole.vertices == len(gc.cut(same, gc.shortest_path(same, 3, 700), False).vertices)
+    with pytest.raises(ValueError, match="no locations"):
+        service.cut(mesh, service.isolines(mesh, [40], levels=[0.5]).levels[0].lines)
+
+
 def test_isolines_matrices_and_candidates(
     service: Client, mesh: Mesh, same: gc.TriangleMesh
 ) -> None:

@@ -12,6 +12,8 @@ PARTS = [
     "compilation",
     "solvers",
     "matrices",
+    "sampling",
+    "loops",
     "cutting",
     "search",
     "fields",

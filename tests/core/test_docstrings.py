@@ -53,7 +53,11 @@ RECORDS = {
 RECORDS |= {"gc.MatrixFile", "gc.Nearest", "gc.Sample", "gc.SearchStep", "gc.SweepStats"}
 RECORDS |= {
     "gc.Border",
+    "gc.Cells",
     "gc.CutMesh",
+    "gc.FarthestPoints",
+    "gc.MeanPoint",
+    "gc.RelaxedPoints",
     "gc.LogMap",
     "gc.Polar",
     "gc.StraightLine",

@@ -19,6 +19,7 @@ EACH = [
     errors.InvalidArgument("k is 0"),
     errors.NoTangentPlane("vertex 0 has no tangent plane", 3),
     errors.NoDirection("direction 2 is zero", 2),
+    errors.NoLoop("every loop shrinks"),
     errors.NotEmbedded("locate needs positions"),
     errors.NoPath("no path", "disconnected"),
     errors.Cancelled("cancelled with 0% done"),

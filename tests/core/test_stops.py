@@ -63,6 +63,10 @@ SWEEPS = {
 SWEEPS |= {
     "log map": lambda m, **watch: gc.log_map(m, INSIDE, x_axis=7, **watch),
     "cut": lambda m, **watch: gc.cut(m, crossing_chords(), **watch),
+    "farthest points": lambda m, **watch: gc.farthest_points(m, 60, **watch).distances,
+    "relaxed": lambda m, **watch: gc.relax_points(m, [INSIDE, 5, 900], 3, **watch).costs,
+    "mean": lambda m, **watch: gc.mean_point(m, [INSIDE, 5, 900], **watch),
+    "sides": lambda m, **watch: gc.paths_around(m, 0, 2000, 1000, **watch),
     "lines": lambda m, **watch: gc.trace(m, MANY, np.arange(10.0), 300.0, **watch),
 }
 SEARCHES = {
@@ -111,6 +115,7 @@ CALLS = {name: Call(mesh, ask) for name, ask in SWEEPS.items()}
 CALLS |= {name: Call(solver, ask) for name, ask in SEARCHES.items()}
 CALLS |= {name: Call(solver, ask, 1) for name, ask in MATRICES.items()}  # threads are asked, too
 CALLS |= {f"{f}: {m}": Call(FIELDS[f], METHODS[m]) for f, m in PAIRS if computes(f, m)}
+CALLS["cells"] = Call(FIELDS["two"], lambda field, **watch: field.cells(**watch).cell_of)
 READY = {f"{f}: {m}": Call(FIELDS[f], METHODS[m]) for f, m in PAIRS if not computes(f, m)}
 TO_ONE = [name for name in CALLS if "_at" not in name and "path_to" not in name]
 """Calls whose progress ends at 1; that of a search for one point ends when it is found."""

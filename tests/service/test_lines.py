@@ -1,7 +1,8 @@
 """Lines of values, and boundaries, over HTTP: the library's to the bit, and what is refused."""
 
 import csv
-from io import StringIO
+import json
+from io import BytesIO, StringIO
 from typing import Any
 
 import numpy as np
@@ -157,3 +158,65 @@ def test_refused_boundaries(
 ) -> None:
     problem = check_problem(ask(client, terrain, "boundaries", **body), 422, "invalid_request")
     assert [fault["pointer"] for fault in problem["errors"]] == places
+
+
+def as_npy(array: np.ndarray) -> bytes:
+    file = BytesIO()
+    np.save(file, array)
+    return file.getvalue()
+
+
+def send_form(client: TestClient, mesh_id: str, request: Any, **arrays: bytes) -> Any:
+    parts: dict[str, Any] = {"request": (None, json.dumps(request), "application/json")}
+    parts |= {name: (None, array, "application/x-npy") for name, array in arrays.items()}
+    return client.post(f"/v1/meshes/{mesh_id}/isolines", files=parts)
+
+
+@pytest.mark.parametrize("kind", [">f8", "float32", "int16"])
+def test_values_in_numpy_s_format_are_those_of_a_list(
+    client: TestClient, terrain: str, kind: str
+) -> None:
+    values = own_values(stored_mesh(client, terrain)) * 100.0
+    values[40:43] = np.inf if kind != "int16" else 7.0
+    values = values.astype(kind)
+    request = {"levels": [0.5, -20.0], "include": ["locations"]}
+    listed = [float(x) if np.isfinite(x) else None for x in values]
+    expected = ask(client, terrain, "isolines", **request, values=listed)
+    found = send_form(client, terrain, request, values=as_npy(values))
+    assert (found.status_code, found.content) == (200, expected.content)
+
+
+def test_forms_that_are_refused(client: TestClient, terrain: str) -> None:
+    request, values = {"levels": [0.5]}, np.zeros(len(stored_mesh(client, terrain).vertices))
+    npy = as_npy(values)
+    lying = as_npy(np.zeros(10)).replace(b"(10,)", b"(99,)")
+    for wrong, message in (
+        (b"no array", "numpy's format"),
+        (npy[:-1], "numpy's format"),
+        (lying, "numpy's format"),
+        (npy[:90], "numpy's format"),
+        (as_npy(np.array([None, 1], object)), "numpy's format"),
+        (as_npy(values[:, None]), "a list of real numbers"),
+        (as_npy(values.astype(complex)), "a list of real numbers"),
+        (as_npy(values > 0), "a list of real numbers"),
+        (as_npy(values[1:]), "values"),
+    ):
+        refused = send_form(client, terrain, request, values=wrong)
+        problem = check_problem(refused, 422, "invalid_request")
+        assert [fault["pointer"] for fault in problem["errors"]] == ["/values"]
+        assert message in problem["detail"]
+    for sent in (
+        send_form(client, terrain, request, value=npy),
+        send_form(client, terrain, {**request, "values": [1]}, values=npy),
+        send_form(client, terrain, [request], values=npy),
+        client.post(f"/v1/meshes/{terrain}/isolines", files={"values": (None, npy)}),
+        client.post(
+            f"/v1/meshes/{terrain}/isolines",
+            content=b"--x\r\n",
+            headers={"Content-Type": "multipart/form-data; boundary=x"},
+        ),
+    ):
+        check_problem(sent, 400, "malformed_body")
+    elsewhere = client.post(f"/v1/meshes/{terrain}/distances", files={"request": (None, "{}")})
+    check_problem(elsewhere, 415, "unsupported_media_type")
+    assert send_form(client, terrain, {"sources": [0], **request}).status_code == 200

@@ -75,6 +75,32 @@ MORE_SEEDS: Mapping[str, tuple[Any, ...]] = {
             "barriers": [7],
         },
     ),
+    "samplePoints": (
+        {
+            "radius": 0.5,
+            "starts": [3, {"face": 0, "barycentric": [0.2, 0.3, 0.5]}],
+            "iterations": 2,
+            "include": ["distances"],
+            "barriers": [7],
+        },
+    ),
+    "computeCells": (
+        {
+            "sources": [0, {"polyline": [3, {"edge": [0, 1], "t": 0.5}]}],
+            "max_distance": 1.5,
+            "chord_error": 0.1,
+            "barriers": [7],
+        },
+    ),
+    "findMean": ({"points": [0, {"face": 0, "barycentric": [0.2, 0.3, 0.5]}], "weights": [1, 2]},),
+    "cutMesh": (
+        {
+            "curves": [
+                {"polyline": [0, {"face": 0, "barycentric": [0.2, 0.3, 0.5]}], "closed": True}
+            ],
+            "separate": False,
+        },
+    ),
     "locatePoints": ({"points": [[0.5, 0.5, 1]], "max_distance": 0.5},),
 }
 """What the examples of the interface document do not have"""

@@ -5,10 +5,12 @@ from base64 import b64encode
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import anyio
+import numpy as np
 import pytest
 from structlog.testing import capture_logs
 
@@ -63,6 +65,22 @@ def drop_copies(service: ServiceClient) -> None:
     supply = service.app.state.service.store.supply  # type: ignore[attr-defined]
     for mesh_id in copies_of(service):
         anyio.run(supply.drop_copy, mesh_id)
+
+
+def test_a_mesh_that_this_machine_lacks_is_cut_and_sent(service: ServiceClient) -> None:
+    mesh_id = upload_sample(service, "plane", 200)
+    drop_copies(service)
+    made = service.post(f"/v1/meshes/{mesh_id}/cut", json={"curves": [{"polyline": [0, 1]}]})
+    assert made.status_code == 201
+    drop_copies(service)
+    own = gc.cut(stored_mesh(service, mesh_id), gc.Curve([0, 1]))
+    parts = np.load(BytesIO(service.get(f"{made.headers['location']}/arrays/parts").content))
+    np.testing.assert_array_equal(parts, own.parts)
+    reached = distances(service, made.json()["cut_mesh_id"]).json()["distances"]
+    assert reached == [
+        each if np.isfinite(each) else None
+        for each in gc.exact_distance(own.mesh, 0).distances.tolist()
+    ]
 
 
 @both_providers

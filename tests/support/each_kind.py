@@ -37,6 +37,10 @@ def irregular() -> object:
 
 
 QUESTIONS: dict[str, Callable[[], object]] = {
+    "straightened": lambda: gc.straighten(gc.shortest_path(MESH, 0, LAST, [ON_EDGE])),
+    "loop through a point": lambda: gc.shortest_loop(gc.samples.knot(500), POINT),
+    "loops of handles": lambda: gc.handle_loops(gc.samples.knot(500)),
+    "paths around": lambda: gc.paths_around(MESH, 0, LAST, len(MESH.vertices) // 2),
     "exact": lambda: gc.exact_distance(MESH, 0),
     "path of a field": lambda: gc.exact_distance(MESH, [0, POINT]).path_to(LAST),
     "path to a point": lambda: gc.exact_distance(MESH, ON_EDGE, targets=[POINT]).path_to(POINT),

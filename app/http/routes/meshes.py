@@ -34,8 +34,9 @@ from app.http.responses import (
 )
 from app.http.uploads import spool
 from app.schemas.meshes import MeshDocument, MeshList, MeshListParameters, UploadParameters
+from app.service.mesh_storing import StoredMesh
 from app.service.request_context import RequestContext
-from app.service.service import Service, StoredMesh
+from app.service.service import Service
 from app.service.time_limit import time_limit
 
 router = APIRouter(prefix="/meshes", tags=["meshes"])

@@ -9,8 +9,9 @@ from pydantic import BaseModel
 from app import queries
 from app.encoding import CSV, JSON, NPY, NPZ, OBJ, OCTETS, PLY
 from app.encoding.representation import ARRAYS, TEXTS
+from app.http.query_form import REQUEST
 from app.http.responses import FILE_HEADERS, QUERY_PROBLEMS, documented, problems
-from app.http.routes.query_route import QueryHeaders, QueryRoute, answer
+from app.http.routes.query_route import FORM, QueryHeaders, QueryRoute, answer
 from app.queries import naming_parameters, written_request
 from app.schemas import answers
 from app.schemas.requests import AnswerParameters, PathParameters
@@ -45,6 +46,8 @@ class Operation(NamedTuple):
     """What the answer is"""
     others: Sequence[str] = ()
     """Media types beside JSON, which hold only a part of the answer"""
+    makes_mesh: bool = False
+    """Whether the answer names a mesh that is then in the store"""
 
 
 _LINES = OBJ, CSV
@@ -121,6 +124,52 @@ OPERATIONS = (
         "Return the curves of edges with one face, longest first, with the surface on their left.",
         "The lines, closed and open",
         _LINES,
+    ),
+    Operation(
+        "/samples",
+        queries.SamplesQuery,
+        answers.SamplesAnswer,
+        "samplePoints",
+        "Points spread over the surface, each the farthest from those before",
+        "Return points until there are `count` of them or each vertex is within `radius` of "
+        "one.\n\nThey are vertices, but for those of `starts`. With `iterations` they then move to "
+        "the middle of what is nearest\nto each, and are points in faces.",
+        "The points, in the order in which they were added",
+        (CSV,),
+    ),
+    Operation(
+        "/cells",
+        queries.CellsQuery,
+        answers.CellsAnswer,
+        "computeCells",
+        "Areas, centroids and neighbours of the parts that are nearest to each source",
+        "Return what the borders between the territories of sources enclose.\n\nAreas sum to that "
+        "of the surface, or of what is within `max_distance`.",
+        "The cells, in the order of the sources",
+        (CSV,),
+    ),
+    Operation(
+        "/mean",
+        queries.MeanQuery,
+        answers.MeanAnswer,
+        "findMean",
+        "The mean of points on the surface",
+        "Return the point whose squared distances from some points sum to the least.\n\nIt is "
+        "also called their Karcher or Fréchet mean.",
+        "The point, and whether no other near it is better",
+    ),
+    Operation(
+        "/cut",
+        queries.CutQuery,
+        answers.CutAnswer,
+        "cutMesh",
+        "The mesh cut along curves, as a new mesh",
+        "Make a mesh of which the curves are edges, and store it like an upload.\n\nThe "
+        "`locations` of paths, isolines, borders, boundaries and traces can be curves. Old "
+        "vertices keep their\nnumbers; faces that no curve meets stay as they are. The new mesh "
+        "has arrays that lead back to the old one,\nand its id is a hash of these, too.",
+        "The mesh was in the store already",
+        makes_mesh=True,
     ),
     Operation(
         "/matrix",
@@ -203,14 +252,23 @@ def _responses(operation: Operation) -> dict[int | str, dict[str, Any]]:
     described = documented("Vary", "Server-Timing", *FILE_HEADERS)
     if any(name in ARRAYS for name in others):
         described |= documented("Geodesic-Dtype", "Geodesic-Shape")
+    content = operation.content
+    if others:
+        content += (
+            ". In formats other than JSON the rest comes as `Geodesic-…` headers; "
+            "`Geodesic-Omitted` names what is too long for one"
+        )
+    whole = {"model": operation.answer, "description": content, "headers": described}
+    made: dict[int | str, dict[str, Any]] = {}
+    if operation.makes_mesh:
+        described |= documented("Location")
+        made[201] = {**whole, "description": "The mesh is new in the store"}
     return {
         200: {
-            "model": operation.answer,
+            **whole,
             "content": {name: {"schema": _TEXT if name in TEXTS else _BINARY} for name in others},
-            "description": f"{operation.content}. In formats other than JSON the rest comes as "
-            "`Geodesic-…` headers; `Geodesic-Omitted` names what is too long for one",
-            "headers": described,
         },
+        **made,
         202: {
             "model": JobDocument,
             "description": "With `Prefer: respond-async`: the job",
@@ -224,6 +282,23 @@ def _responses(operation: Operation) -> dict[int | str, dict[str, Any]]:
     }
 
 
+def _also_as_form(operation: Operation) -> dict[str, Any]:
+    """Return the further kind of body of a query that may have arrays, for OpenAPI."""
+    arrays = operation.kind.model.arrays
+    if not arrays:
+        return {}
+    body = {"$ref": f"#/components/schemas/{operation.kind.model.__name__}"}
+    array = {**_BINARY, "description": "A list of numbers in numpy's format (`.npy`)"}
+    form = {
+        "type": "object",
+        "additionalProperties": False,
+        "required": [REQUEST],
+        "properties": {REQUEST: body, **dict.fromkeys(arrays, array)},
+    }
+    encoding = {REQUEST: {"contentType": JSON}, **{name: {"contentType": NPY} for name in arrays}}
+    return {"requestBody": {"content": {FORM: {"schema": form, "encoding": encoding}}}}
+
+
 for each in OPERATIONS:
     router.add_api_route(
         each.path,
@@ -234,6 +309,7 @@ for each in OPERATIONS:
         description=each.description,
         response_class=Response,
         responses={**_responses(each), **problems(*_BODY_CODES, quota_exceeded=507)},
+        openapi_extra=_also_as_form(each),
     )
 
 

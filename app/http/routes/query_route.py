@@ -28,6 +28,7 @@ from app.http.dependencies import (
 )
 from app.http.large_bodies import LARGE, large_bodies_of
 from app.http.prefix import prefix_of
+from app.http.query_form import REQUEST, as_json, numbers_in, parts_of
 from app.http.responses import (
     CACHED,
     NEGOTIATED,
@@ -39,12 +40,13 @@ from app.http.responses import (
 )
 from app.jobs import Job
 from app.queries import Query, check_lengths, result_key
-from app.schemas.requests import AnswerParameters
+from app.schemas.requests import AnswerParameters, QueryBody
 from app.service.answering import Answered
 from app.settings import Settings
 
 _PARTS = "header", "query", "body"
 """Parameters of a handler, each a model; problems name them as the beginning of a place"""
+FORM = "multipart/form-data"
 _LEAST_BYTES_OF_VALUE = 7
 """Bytes a value for a body that is full: indices of six digits. To parse denser ones takes long."""
 
@@ -91,10 +93,12 @@ class QueryRoute(APIRoute):
             if "body" not in parts:
                 whole = read(model, head, body, settings)
             else:
-                require_json(request)
+                form = _form_type(request, kinds["body"])
+                if form is None:
+                    require_json(request)
                 large, deadline_s = large_bodies_of(request), settings.deadline_s
                 async with large.reading(request, deadline_s):
-                    reading = partial(read, model, head, await request.body(), settings)
+                    reading = partial(read, model, head, await request.body(), settings, form)
                     whole = await large.check(request, deadline_s, reading)
             mesh_id = request.path_params["mesh_id"]
             response: Response = await self.endpoint(mesh_id, request, **vars(whole))
@@ -145,25 +149,45 @@ async def answer(
     answered = await while_connected(request, answering)
     if isinstance(answered, Job):
         return accepted_response(answered, prefix_of(request.scope))
-    result, seconds = answered
+    result, seconds, mesh = answered
     note_work(request, mesh_id, seconds)
+    status = 200
+    if mesh is not None:
+        headers["Location"] = f"{prefix_of(request.scope)}/v1/meshes/{mesh.mesh_id}"
+        status = 201 if mesh.is_new else 200
     media_type = query.representation.media_type
-    return result_response(request, result, seconds, media_type, service.results, headers)
+    return result_response(request, result, seconds, media_type, service.results, headers, status)
 
 
-def read(model: type[BaseModel], head: dict[str, Any], body: bytes, settings: Settings) -> Any:
-    """Return the model of a request, from the values of its head and its JSON body.
+def _form_type(request: Request, kind: type[QueryBody]) -> str | None:
+    """Return the Content-Type of a form, where a query may be one: because it may have arrays."""
+    content_type = request.headers.get("content-type", "")
+    is_form = content_type.partition(";")[0].strip().lower() == FORM
+    return content_type if is_form and kind.arrays else None
+
+
+def read(
+    model: type[BaseModel],
+    head: dict[str, Any],
+    body: bytes,
+    settings: Settings,
+    form: str | None = None,
+) -> Any:
+    """Return the model of a request, from the values of its head and its body.
+
+    That is JSON, or a form of this Content-Type.
 
     Raises
     ------
     ProblemError
-        The body is not JSON, or has too many values, or too long a list.
+        The body cannot be read, or has too many values, or too long a list.
     RequestValidationError
         A value does not fit the model.
     """
     if body:
-        head = {**head, "body": parse_json(body, settings)}
         kind: Any = model.model_fields["body"].annotation
+        given = parse_json(body, settings) if form is None else _in_form(form, body, kind, settings)
+        head = {**head, "body": given}
         check_lengths(head["body"], kind, settings)
     try:
         return model.model_validate(head)
@@ -171,20 +195,36 @@ def read(model: type[BaseModel], head: dict[str, Any], body: bytes, settings: Se
         raise RequestValidationError(error.errors(include_url=False)) from None
 
 
+def _in_form(content_type: str, body: bytes, kind: type[QueryBody], settings: Settings) -> Any:
+    """Return the value of a body that is a form."""
+    parts = parts_of(content_type, body, kind.arrays)
+    given = parse_json(parts.pop(REQUEST), settings)
+    for name, part in parts.items():
+        if not isinstance(given, dict) or name in given:
+            raise problem("malformed_body", f"the request must be an object without {name}")
+        numbers = numbers_in(name, part)
+        _refuse_values(len(numbers), settings)
+        given[name] = as_json(numbers)
+    return given
+
+
 def parse_json(body: bytes, settings: Settings) -> Any:
     """Return the value of a JSON body, or refuse the body.
 
     The parser stops everything else, so that values are counted before, by their commas.
     """
-    most = max(settings.max_query_bytes // _LEAST_BYTES_OF_VALUE, LARGE)
-    values = body.count(b",") + 1
-    if values > most:
-        raise over_limit("limit_exceeded", "values in the body", values, most, "max_query_bytes")
+    _refuse_values(body.count(b",") + 1, settings)
     try:
         return from_json(body)
     except ValueError as error:
         code = "invalid_request" if "number out of range" in str(error) else "malformed_body"
         raise problem(code, f"the body cannot be read as JSON: {error}") from None
+
+
+def _refuse_values(values: int, settings: Settings) -> None:
+    most = max(settings.max_query_bytes // _LEAST_BYTES_OF_VALUE, LARGE)
+    if values > most:
+        raise over_limit("limit_exceeded", "values in the body", values, most, "max_query_bytes")
 
 
 def _headers(request: Request) -> dict[str, str]:

@@ -156,7 +156,8 @@ def link_chains(
     that are ``done`` are left out; the call flags all others. Points between two nodes that are
     nearer than ``shortest`` to the one before are left out. So are closed lines with fewer than
     three points farther apart, and open ones with fewer than two, unless their nodes have different
-    places by ``place_of``: from a place back to itself such a line may be rounding.
+    places by ``place_of``: from a place back to itself such a line may be rounding. A closed line
+    of two points leads over two faces of the same three vertices.
     """
     count, line_count, total = len(chains.nodes), 0, 0
     lines = room_for_lines(len(chains.weights), count)
@@ -174,7 +175,9 @@ def link_chains(
             if is_closed:
                 total -= 1  # the first point again
                 copy_weights(lines.arriving, total, lines.arriving, begin)
-                is_line = apart >= 3
+                is_line = apart >= 3 or (
+                    apart == 2 and lead_apart(chains, place_of, start, start ^ 1)
+                )
             else:
                 is_line = apart >= 1 or lead_apart(chains, place_of, start, last)
             if not is_line:

@@ -33,7 +33,10 @@ IN_BUCKETS = 16  # windows that wait in the ring of buckets
 FAR_FIRST = 17  # slot of the first window beyond the ring, -1 if there is none
 FAR_BUCKET = 18  # the nearest bucket of those
 
-COUNTERS = 19
+# Whether sources were added later, so that lists may wait for an end that is not settled anew
+ADDED = 19
+
+COUNTERS = 20
 
 
 def new_counters() -> Longs:

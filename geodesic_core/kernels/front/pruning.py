@@ -22,6 +22,7 @@ from geodesic_core.kernels.front.state import (
     NODE,
     PREDECESSOR,
     RETAINED,
+    SEEN,
     SENT_AT,
     SENT_FROM,
     SENT_TO,
@@ -43,9 +44,10 @@ MOST = (1.0 + SINGLE_PRECISION) / (1.0 - LANDMARK_ERROR)
 def touch(wave: View, v: int) -> None:
     """Note that v is no longer in its first state, and bound the rest of a path from it.
 
-    Modifies the list of touched vertices and the heuristic.
+    Modifies the list of touched vertices, the status of v and the heuristic.
     """
     vertices = wave.vertices
+    vertices.status[v] = SEEN
     vertices.touched[wave.counters[TOUCHED]] = v
     wave.counters[TOUCHED] += 1
     if is_pruned(wave):

@@ -63,17 +63,16 @@ def relax_node(wave: View, node: int, distance: float, via: int, window: Window)
     known = vertices.distance[node]
     if not precedence(distance, vertices.source_index[root], known, vertices.source_index[node]):
         return
-    if is_vertex and known == math.inf and vertices.status[node] == FAR:
+    if is_vertex and vertices.status[node] == FAR:
         touch(wave, node)
     record_winner(wave, node, via, window.sx, window.sy, root)
     if merging(wave):
         vertices.reference[node] = window.reference
     if directed(wave):
         vertices.turn[node], vertices.mirrored[node] = window.turn, window.mirrored
-    if distance < known:
-        vertices.distance[node] = distance
-        if is_vertex:
-            push_or_raise(wave.queues, wave.counters, node, distance)
+    vertices.distance[node] = distance
+    if is_vertex and distance < known:
+        push_or_raise(wave.queues, wave.counters, node, distance)
 
 
 @kernel

@@ -51,9 +51,10 @@ PREDECESSOR = 1  # node of that window's pseudosource; -1 where unreached, itsel
 WINNER = 2
 
 # Status of a vertex
-FAR = 0
-FRONT = 1  # shares a face with a settled vertex
-SETTLED = 2  # has left the heap
+FAR = 0  # the sweep has not come near yet
+SEEN = 1  # it is among the touched vertices
+FRONT = 2  # shares a face with a settled vertex
+SETTLED = 3  # has left the heap
 
 # Columns of Vertices.light, a row per vertex: angles in its unfolded fan
 LIT_FROM = 0  # the range of directions in which pseudosources are seen; empty if LIT_FROM > LIT_TO
@@ -187,7 +188,7 @@ class Vertices(NamedTuple):
     """(N,): whether its frame is seen in the mirror"""
     # The following are ABSENT from a fast sweep.
     status: Flags
-    """(V,): FAR, FRONT or SETTLED"""
+    """(V,): FAR, SEEN, FRONT or SETTLED"""
     touched: Ints
     """(V,): the vertices that are not as they were at first"""
     heuristic: Floats

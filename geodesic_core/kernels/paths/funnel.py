@@ -1,10 +1,15 @@
-"""A path along edges, shortened across the faces beside it (section 5, step 1).
+"""Strips of faces, and strings pulled taut in them.
 
-The path becomes a strip of faces. A strip is known by its *portals*, the half-edges over which it
+A path becomes a strip of faces. A strip is known by its *portals*, the half-edges over which it
 enters its faces: a portal's tail lies left of the path and its head right. A funnel walk finds the
 shortest path within the strip. Where that bends around a vertex and the angle beyond the vertex is
 less than π, the strip is led past the vertex on its other side. This goes on until the path is
-straight wherever it can be: a local minimum, which is mostly the shortest path already.
+straight wherever it can be: it is then shortest among all that lie near it.
+
+It ends. A path on the other side of such a vertex is shorter, and there are not many strips whose
+strings are no longer than a given length: a string crosses an edge within its length, and meets a
+vertex at least its edges' heights after it has left the one before. What rounding hides is bounded
+by STALLS, and all of it by the number of passes that the caller grants.
 """
 
 import math
@@ -12,175 +17,311 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from geodesic_core.arrays import Floats, Ints
+from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
     COS_LEFT,
+    COS_RIGHT,
     HEAD,
     LENGTH,
     LENGTH_LEFT,
     OPPOSITE,
-    SEAM,
     SIN_LEFT,
+    SIN_RIGHT,
     TAIL,
     Topology,
     following,
+    point_in_frame,
     previous,
 )
-from geodesic_core.tolerances import PASSES, STRAIGHT
+from geodesic_core.tolerances import PASSES, STALLS, STRAIGHT
 
-# Sides on which a strip passes a vertex; a vertex that it cannot pass divides the path
+# On which side of a strip a vertex is
 NEITHER = 0
 RIGHT = 1
 LEFT = 2
 
-_SPARE_PORTALS = 256
-"""Room for portals that a strip gains when it is led past vertices, in all."""
+
+class Strip(NamedTuple):
+    """Faces one after another, and the two points between which a string lies in them."""
+
+    portals: Ints
+    """(N,): the half-edges over which the faces after the first are entered"""
+    faces: Longs
+    """(2,): the first and the last face"""
+    weights: Floats
+    """(2, 3): the points in them"""
+
+
+class String(NamedTuple):
+    """A strip unfolded into the plane, and the shortest line in it."""
+
+    ends: Floats
+    """(N + 1, 4): left x, y and right x, y of each portal, and the last point twice; the first
+    point is the origin"""
+    bends: Ints
+    """(K,): portals at whose ends it bends"""
+    sides: Any
+    """(K,): the sides of these ends"""
+    length: float
+    """Mesh units"""
 
 
 @kernel
 def shortened(topology: Topology, path: Ints) -> float:
     """Shorten a path along edges, given by its vertices; return its length, mesh units."""
-    length = 0.0
-    begin = 0
-    sides = np.empty(len(path), np.int8)
-    for i in range(1, len(path)):
-        sides[i] = NEITHER
-        if i + 1 < len(path):
-            sides[i] = side_to_pass(topology, path[i - 1], path[i], path[i + 1])
-        if sides[i] == NEITHER:
-            length += shortened_part(topology, path[begin : i + 1], sides[begin : i + 1])
-            begin = i
+    count = len(path) - 1
+    faces = np.empty(count, np.int64)
+    starts, ends = np.zeros((count, 3)), np.zeros((count, 3))
+    for i in range(count):
+        faces[i], corner, other = edge_in_face(topology, path[i], path[i + 1])
+        starts[i, corner], ends[i, other] = 1.0, 1.0
+    length, first = 0.0, 0
+    while first < count:
+        strip, first = strip_along(topology, faces, starts, ends, first)
+        length += straightened(topology, strip, STRAIGHT, STRAIGHT, PASSES)[1].length
     return length
 
 
 @kernel
-def shortened_part(topology: Topology, path: Ints, sides: Any) -> float:
-    """Shorten a part of a path that has a strip of faces beside it all along; return its length."""
-    strip, size = strip_along(topology, path, sides)
-    room = len(strip)
-    other = np.empty(room, np.int32)
-    ends = np.empty((room + 1, 4))
-    bends, bend_sides = np.empty(room, np.int32), np.empty(room, np.int8)
-    turns = np.empty(room)
-    length = math.inf
-    for _ in range(PASSES):
-        if size == 0:  # the path is an edge
-            return min(length, edge_length(topology, path[0], path[-1]))
-        unfold_strip(topology, strip, size, ends)
-        taut, count = pull_taut(ends, size, bends, bend_sides, turns)
-        if taut >= length * (1.0 - STRAIGHT):
-            return min(taut, length)
-        length = taut
-        changed, size = around_bends(topology, strip, size, bends[:count], bend_sides, turns, other)
+def edge_in_face(topology: Topology, v: int, u: int) -> tuple[int, int, int]:
+    """Return a face of the edge between two neighbours, and which of its corners they are."""
+    h = topology.corners[topology.first_corner[v]]
+    for c in range(topology.first_corner[v], topology.first_corner[v + 1]):
+        h = topology.corners[c]
+        if topology.links[h, HEAD] == u:
+            return h // 3, h % 3, (h + 1) % 3
+        if topology.links[h, APEX] == u:
+            break
+    return h // 3, h % 3, (h + 2) % 3
+
+
+@kernel
+def straightened(
+    topology: Topology, strip: Strip, straight: float, gain: float, passes: int
+) -> tuple[Strip, String, bool]:
+    """Lead a strip past its bends until its string is straight there, or gains no more.
+
+    ``straight``: radians by which it may be bent; ``gain``: the share of its length that a pass is
+    to gain. Return the strip, its string, and whether ``passes`` passes were enough.
+    """
+    length, stalls = math.inf, 0
+    for _ in range(passes):
+        strip = trimmed(topology, strip)
+        string = pulled_taut(topology, strip)
+        stalls = stalls + 1 if string.length >= length * (1.0 - gain) else 0
+        length = min(length, string.length)
+        if stalls > (STALLS if gain == 0.0 else 0):
+            return strip, string, True
+        changed, portals = around_bends(topology, strip, string, straight)
         if not changed:
-            return length
-        strip, other = other, strip
-    return length
+            return strip, string, True
+        strip = Strip(portals, strip.faces, strip.weights)
+    strip = trimmed(topology, strip)
+    return strip, pulled_taut(topology, strip), False
 
 
 @kernel
-def edge_length(topology: Topology, v: int, u: int) -> float:
-    """Length of the edge between two neighbours, mesh units."""
-    h = corner_toward(topology, v, u, HEAD)
-    if h >= 0:
-        return float(topology.geometry[h, LENGTH])
-    return float(topology.geometry[corner_toward(topology, v, u, APEX), LENGTH_LEFT])
+def strip_along(
+    topology: Topology, faces: Longs, starts: Floats, ends: Floats, begin: int
+) -> tuple[Strip, int]:
+    """Return the strip of a line, and its first segment that no strip joins to those before.
+
+    ``faces`` (N,) hold the segments, from the weights of a row of ``starts`` to that of ``ends``;
+    the line begins with segment ``begin``.
+    """
+    portals, size, i = np.empty(64, np.int32), 0, begin
+    while i + 1 < len(faces):
+        f, g, corner = faces[i], faces[i + 1], corner_with(ends[i], 1.0)
+        if f != g and corner >= 0:
+            v = topology.links[3 * f + corner, TAIL]
+            degree = topology.first_corner[v + 1] - topology.first_corner[v]
+            portals = with_room(portals, size, degree)
+            first = angles_at_tail(topology, 3 * f + corner, starts[i])
+            h = half_edge_from(topology.links, g, v)
+            last = angles_at_tail(topology, h, ends[i + 1])
+            right, right_angle = around_vertex(topology, f, corner, g, RIGHT, portals, size)
+            left, left_angle = around_vertex(topology, f, corner, g, LEFT, portals, size)
+            way, end = RIGHT, right
+            right_angle += first[0] + last[1]
+            if left >= 0 and (right < 0 or left_angle + first[1] + last[0] <= right_angle):
+                way, end = LEFT, left
+            if end < 0:
+                break
+            around_vertex(topology, f, corner, g, way, portals, size)
+            size = reduced(topology.links, portals, size, end)
+        elif f != g:
+            h = edge_between(topology.links, f, g, starts[i + 1])
+            if h < 0:
+                break
+            portals = with_room(portals, size, 1)
+            portals[size] = h
+            size = reduced(topology.links, portals, size, size + 1)
+        i += 1
+    ends_of = np.empty((2, 3))
+    ends_of[0], ends_of[1] = starts[begin], ends[i]
+    return Strip(portals[:size].copy(), np.array([faces[begin], faces[i]]), ends_of), i + 1
 
 
 @inlined
-def corner_toward(topology: Topology, v: int, u: int, column: int) -> int:
-    """Corner at v whose HEAD or APEX is u, or -1."""
-    for c in range(topology.first_corner[v], topology.first_corner[v + 1]):
-        if topology.links[topology.corners[c], column] == u:
-            return topology.corners[c]
+def half_edge_from(links: Ints, face: int, v: int) -> int:
+    """Half-edge of a face that leaves its corner v."""
+    h = 3 * face
+    while links[h, TAIL] != v:
+        h += 1
+    return h
+
+
+@kernel
+def angles_at_tail(topology: Topology, h: int, weights: Floats) -> tuple[float, float]:
+    """Angles at the tail of h between it and a point of its face, and from there on, radians."""
+    x, y = point_in_frame(topology.geometry, h, weights)
+    angle = math.atan2(y, x)
+    return angle, angle_at(topology.geometry, h, LEFT) - angle
+
+
+@kernel
+def with_room(portals: Ints, size: int, more: int) -> Ints:
+    """Return portals with room for some more."""
+    if size + more <= len(portals):
+        return portals
+    larger = np.empty(2 * (size + more), np.int32)
+    larger[:size] = portals[:size]
+    return larger
+
+
+@inlined
+def corner_with(weights: Floats, weight: float) -> int:
+    """Return the corner of a face that has a weight, or -1."""
+    for k in range(3):
+        if weights[k] == weight:
+            return k
     return -1
 
 
 @kernel
-def side_to_pass(topology: Topology, before: int, v: int, after: int) -> int:
-    """Side of v with the lesser angle between two of its neighbours; one without a hole.
+def edge_between(links: Ints, f: int, g: int, weights: Floats) -> int:
+    """Return the half-edge of face g over which f is, and a point on it; -1 if there is none."""
+    found = -1
+    for h in range(3 * g, 3 * g + 3):
+        across, up = links[h, OPPOSITE], weights[(h + 2) % 3]
+        if across >= 0 and across // 3 == f and (found < 0 or up < weights[(found + 2) % 3]):
+            found = h
+    return found
 
-    At the end of an irregular edge there are more than two sides. Then it is NEITHER.
+
+@kernel
+def around_vertex(
+    topology: Topology, f: int, corner: int, g: int, side: int, portals: Ints, row: int
+) -> tuple[int, float]:
+    """Write the portals from face f around its corner to face g, which have it on a side.
+
+    Return the row after the last, -1 if a hole is in the way, and the angle between, radians.
     """
-    if topology.flags[v] & SEAM:
-        return NEITHER
-    right = angle_on_right(topology, before, v, after)
-    left = angle_on_right(topology, after, v, before)
-    if right == math.inf and left == math.inf:
-        return NEITHER
-    return RIGHT if right <= left else LEFT
+    h, angle = 3 * f + corner, 0.0
+    if side == RIGHT:  # clockwise: over the half-edge that leaves it
+        h = following(following(h))
+    while True:
+        h = next_portal(topology.links, h, side)
+        if h < 0 or h // 3 == f:
+            return -1, angle
+        portals[row] = h
+        row += 1
+        if h // 3 == g:
+            return row, angle
+        angle += angle_at(topology.geometry, h, side)
+
+
+@inlined
+def next_portal(links: Ints, h: int, side: int) -> int:
+    """Portal after h around the vertex at its end on a side; negative if there is none."""
+    return links[previous(h) if side == LEFT else following(h), OPPOSITE]
+
+
+@inlined
+def angle_at(geometry: Floats, h: int, side: int) -> float:
+    """Angle of a face at the end of its portal on a side, radians."""
+    if side == LEFT:
+        return math.atan2(geometry[h, SIN_LEFT], geometry[h, COS_LEFT])
+    return math.atan2(geometry[h, SIN_RIGHT], geometry[h, COS_RIGHT])
 
 
 @kernel
-def angle_on_right(topology: Topology, before: int, v: int, after: int) -> float:
-    """Angle at v from one neighbour counter-clockwise to another; infinite if a hole lies there."""
-    angle = 0.0
-    h = corner_toward(topology, v, before, HEAD)
-    for _ in range(topology.first_corner[v + 1] - topology.first_corner[v]):
-        if h < 0:
-            return math.inf
-        angle += math.atan2(topology.geometry[h, SIN_LEFT], topology.geometry[h, COS_LEFT])
-        if topology.links[h, APEX] == after:
-            return angle
-        h = topology.links[previous(h), OPPOSITE]
-    return math.inf
+def reduced(links: Ints, portals: Ints, size: int, end: int) -> int:
+    """Append portals from row ``size`` to ``end`` to those before; return how many are left.
 
-
-@kernel
-def strip_along(topology: Topology, path: Ints, sides: Any) -> tuple[Ints, int]:
-    """Return the portals of a strip along a path, with room for more, and their number."""
-    links = topology.links
-    room = _SPARE_PORTALS
-    for v in path:
-        room += 4 * (topology.first_corner[v + 1] - topology.first_corner[v])
-    strip = np.empty(room, np.int32)
-    size = 0
-    for i in range(1, len(path) - 1):
-        v, before, after = path[i], path[i - 1], path[i + 1]
-        if sides[i] == RIGHT:
-            h = corner_toward(topology, v, before, HEAD)
-            if i > 1 and sides[i - 1] == LEFT:  # over the edge between the two
-                strip[size] = h
-                size += 1
-            while links[h, APEX] != after:
-                h = links[previous(h), OPPOSITE]
-                strip[size] = h
-                size += 1
+    What leads over an edge and back at once is left out. Modifies ``portals``.
+    """
+    for i in range(size, end):
+        h = portals[i]
+        if size > 0 and links[portals[size - 1], OPPOSITE] == h:
+            size -= 1
         else:
-            h = corner_toward(topology, v, before, APEX)
-            if i > 1 and sides[i - 1] == RIGHT:
-                strip[size] = previous(h)
-                size += 1
-            while links[h, HEAD] != after:
-                across = links[h, OPPOSITE]
-                strip[size] = across
-                size += 1
-                h = following(across)
-    return strip, size
+            portals[size] = h
+            size += 1
+    return size
 
 
 @kernel
-def unfold_strip(topology: Topology, strip: Ints, size: int, ends: Floats) -> None:
-    """Unfold a strip into the plane: fill ``ends`` with rows of left x, y and right x, y.
+def trimmed(topology: Topology, strip: Strip) -> Strip:
+    """Return a strip without the portals that its first or last point lies on."""
+    links, portals, faces, weights = topology.links, strip.portals, strip.faces, strip.weights
+    faces, weights = faces.copy(), weights.copy()
+    lo, hi = 0, len(portals)
+    while lo < hi and weights[0, (links[portals[lo], OPPOSITE] + 2) % 3] == 0.0:
+        move_over(weights[0], links[portals[lo], OPPOSITE], portals[lo])
+        faces[0] = portals[lo] // 3
+        lo += 1
+    while lo < hi and weights[1, (portals[hi - 1] + 2) % 3] == 0.0:
+        move_over(weights[1], portals[hi - 1], links[portals[hi - 1], OPPOSITE])
+        faces[1] = links[portals[hi - 1], OPPOSITE] // 3
+        hi -= 1
+    return Strip(portals[lo:hi], faces, weights)
 
-    Row i is portal i, and the last row the vertex at the end. The vertex at the start, before the
-    first portal, is the origin.
-    """
-    geometry = topology.geometry
-    h = topology.links[strip[0], OPPOSITE]
-    ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
-    ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
+
+@inlined
+def move_over(weights: Floats, g: int, h: int) -> None:
+    """Write the weights of a point on half-edge g as those in the face of its opposite h."""
+    tail, head = weights[g % 3], weights[(g + 1) % 3]
+    weights[h % 3], weights[(h + 1) % 3], weights[(h + 2) % 3] = head, tail, 0.0
+
+
+@kernel
+def pulled_taut(topology: Topology, strip: Strip) -> String:
+    """Return the string of a strip."""
+    size = len(strip.portals)
+    ends = np.empty((size + 1, 4))
+    unfold_strip(topology, strip, ends)
+    bends, sides = np.empty(size, np.int32), np.empty(size, np.int8)
+    length, count = pull_taut(ends, size, bends, sides)
+    return String(ends, bends[:count], sides[:count], length)
+
+
+@kernel
+def unfold_strip(topology: Topology, strip: Strip, ends: Floats) -> None:
+    """Unfold a strip into the plane: fill ``ends``, see `String`."""
+    geometry, portals, size = topology.geometry, strip.portals, len(strip.portals)
+    if size == 0:
+        h = 3 * strip.faces[0]
+        ax, ay = point_in_frame(geometry, h, strip.weights[0])
+        bx, by = point_in_frame(geometry, h, strip.weights[1])
+        ends[0, 0] = ends[0, 2] = bx - ax
+        ends[0, 1] = ends[0, 3] = by - ay
+        return
+    h = topology.links[portals[0], OPPOSITE]
+    ax, ay = point_in_frame(geometry, h, strip.weights[0])
     lx, ly, rx, ry = geometry[h, LENGTH] - ax, -ay, -ax, -ay
     for i in range(size):
-        h = strip[i]
+        h = portals[i]
         ends[i, 0], ends[i, 1], ends[i, 2], ends[i, 3] = lx, ly, rx, ry
         ex, ey = (rx - lx) / geometry[h, LENGTH], (ry - ly) / geometry[h, LENGTH]
         along = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
         ahead = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
+        if i + 1 == size:
+            along, ahead = point_in_frame(geometry, h, strip.weights[1])
         ax, ay = lx + along * ex - ahead * ey, ly + along * ey + ahead * ex
-        if i + 1 < size and strip[i + 1] == topology.links[previous(h), OPPOSITE]:
+        if i + 1 < size and portals[i + 1] == topology.links[previous(h), OPPOSITE]:
             rx, ry = ax, ay
         else:
             lx, ly = ax, ay
@@ -191,6 +332,12 @@ def unfold_strip(topology: Topology, strip: Ints, size: int, ends: Floats) -> No
 def area(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> float:
     """Twice the area of the triangle a b c, positive if counter-clockwise."""
     return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+
+
+@inlined
+def angle_between(ax: float, ay: float, bx: float, by: float) -> float:
+    """Angle between two vectors, radians, 0 to π."""
+    return abs(math.atan2(ax * by - ay * bx, ax * bx + ay * by))
 
 
 class Funnel(NamedTuple):
@@ -236,15 +383,13 @@ def narrow_funnel(ends: Floats, i: int, funnel: Funnel) -> tuple[int, Funnel]:
 
 
 @kernel
-def pull_taut(
-    ends: Floats, size: int, bends: Ints, bend_sides: Any, turns: Floats
-) -> tuple[float, int]:
+def pull_taut(ends: Floats, size: int, bends: Ints, sides: Any) -> tuple[float, int]:
     """Pull a string taut within a strip; return its length and the number of its bends.
 
-    Fills ``bends`` with the portals at whose ends the string bends, ``bend_sides`` with the sides
-    of these ends, and ``turns`` with the angles, radians.
+    Fills ``bends`` with the portals at whose ends the string bends, and ``sides`` with the sides of
+    these ends.
     """
-    count, length, dx, dy = 0, 0.0, 0.0, 0.0  # (dx, dy): the straight part before
+    count, length = 0, 0.0
     i, funnel = 1, open_funnel(ends, 0, 0.0, 0.0)
     while True:
         side = NEITHER
@@ -259,15 +404,11 @@ def pull_taut(
             bx, by, portal = funnel.lx, funnel.ly, funnel.left
         elif side == RIGHT:
             bx, by, portal = funnel.rx, funnel.ry, funnel.right
-        ex, ey = bx - funnel.px, by - funnel.py
-        length += math.sqrt(ex * ex + ey * ey)
-        if count > 0:
-            turns[count - 1] = abs(math.atan2(dx * ey - dy * ex, dx * ex + dy * ey))
+        length += math.hypot(bx - funnel.px, by - funnel.py)
         if portal >= size or count >= len(bends):
             return length, count
-        bends[count], bend_sides[count] = portal, side
+        bends[count], sides[count] = portal, side
         count += 1
-        dx, dy = ex, ey
         # On from the first portal that leaves this vertex behind
         i, column = portal + 1, 0 if side == LEFT else 2
         while i < size and ends[i, column] == bx and ends[i, column + 1] == by:
@@ -278,95 +419,187 @@ def pull_taut(
 
 @kernel
 def around_bends(
-    topology: Topology,
-    strip: Ints,
-    size: int,
-    bends: Ints,
-    bend_sides: Any,
-    turns: Floats,
-    other: Ints,
-) -> tuple[bool, int]:
+    topology: Topology, strip: Strip, string: String, straight: float
+) -> tuple[bool, Ints]:
     """Lead a strip past its bends on their other side, where that shortens the path.
 
-    Writes the new strip to ``other``; returns whether it differs, and its size.
+    Return whether its portals differ, and them.
     """
-    links = topology.links
-    copied, new_size = 0, 0
+    links, portals = topology.links, strip.portals
+    string = with_touched(string, straight)
+    bends, sides, room = string.bends, string.sides, len(portals)
     for k in range(len(bends)):
-        end = TAIL if bend_sides[k] == LEFT else HEAD
-        first = last = bends[k]
-        v = links[strip[first], end]
-        beyond = topology.total_angle[v] - math.pi - turns[k]
-        if beyond >= math.pi - STRAIGHT:
+        v = links[portals[bends[k]], TAIL if sides[k] == LEFT else HEAD]
+        room += topology.first_corner[v + 1] - topology.first_corner[v]
+    other, size, copied = np.empty(room, np.int32), 0, 0
+    for k in range(len(bends)):
+        first, last = run_at(links, portals, bends[k], sides[k])
+        count, around = fan_at(topology, portals[first], sides[k])
+        run = last + 1 - first
+        # A run that another one has changed has its turn in the next pass
+        if first < copied or count == 0:
             continue
-        while first > 0 and links[strip[first - 1], end] == v:
-            first -= 1
-        while last + 1 < size and links[strip[last + 1], end] == v:
-            last += 1
-        if copied > 0 and first <= copied:  # its face before is no longer on the strip
+        if run < count and around - angle_in_strip(topology, strip, string, k) >= (
+            math.pi - straight
+        ):
             continue
-        end_size = pass_beyond(
-            topology, strip, first, last, bend_sides[k], size, other, new_size + first - copied
-        )
-        if end_size < 0:
-            continue
-        for i in range(copied, first):
-            other[new_size + i - copied] = strip[i]
-        copied, new_size = last + 1, end_size
-    if copied == 0 or new_size + size - copied > len(other):
-        return False, size
-    for i in range(copied, size):
-        other[new_size + i - copied] = strip[i]
-    return True, new_size + size - copied
+        end = size + first - copied
+        other[size:end] = portals[copied:first]
+        if run < count:
+            other_side = LEFT if sides[k] == RIGHT else RIGHT
+            h = links[portals[first], OPPOSITE]
+            for _ in range(count - run):
+                h = next_portal(links, h, other_side)
+                other[end] = h
+                end += 1
+        else:  # once around the vertex, and more
+            other[end : end + run - count] = portals[first : first + run - count]
+            end += run - count
+        size, copied = reduced(links, other, size, end), last + 1
+    if copied == 0:
+        return False, portals
+    end = size + len(portals) - copied
+    other[size:end] = portals[copied:]
+    return True, other[: reduced(links, other, size, end)]
 
 
 @kernel
-def pass_beyond(
-    topology: Topology,
-    strip: Ints,
-    first: int,
-    last: int,
-    side: int,
-    size: int,
-    other: Ints,
-    begin: int,
-) -> int:
-    """Write the portals around a vertex on its other side, which replace those from first to last.
+def with_touched(string: String, straight: float) -> String:
+    """Return a string that also counts as bends what it passes straight: ends of portals on it.
 
-    They are written to ``other`` from row ``begin`` on. Returns the row after the last, or -1 if a
-    hole is in the way or there is no room. An edge at an end of the path is no portal.
+    Beside a tip, the other side of such a vertex may be shorter.
     """
-    links = topology.links
-    entered = links[strip[first], OPPOSITE]
-    if side == LEFT:
-        h = links[following(entered), OPPOSITE]
-        goal = previous(strip[last])
+    ends, size, k, count = string.ends, len(string.ends) - 1, 0, 0
+    bends, sides = np.empty(2 * size, np.int32), np.empty(2 * size, np.int8)
+    ax, ay = 0.0, 0.0
+    for i in range(size):
+        portal, column = size, 0
+        if k < len(string.bends):
+            portal, column = string.bends[k], 0 if string.sides[k] == LEFT else 2
+        bx, by = ends[portal, column], ends[portal, column + 1]
+        for side in (LEFT, RIGHT):
+            end = 0 if side == LEFT else 2
+            x, y = ends[i, end], ends[i, end + 1]
+            if portal < size and end == column and x == bx and y == by:
+                is_new = i == portal
+            else:
+                is_new = i == 0 or ends[i - 1, end] != x or ends[i - 1, end + 1] != y
+                is_new = is_new and is_between(ax, ay, bx, by, x, y, straight)
+            if is_new:
+                bends[count], sides[count] = i, side
+                count += 1
+        is_left = ends[i + 1, column] != bx or ends[i + 1, column + 1] != by
+        if portal < size and i >= portal and is_left:
+            ax, ay, k = bx, by, k + 1
+    return String(ends, bends[:count], sides[:count], string.length)
+
+
+@inlined
+def is_between(
+    ax: float, ay: float, bx: float, by: float, x: float, y: float, straight: float
+) -> bool:
+    """Whether a point is on the line from a to b, seen from both but for an angle."""
+    to_a, to_b = math.hypot(x - ax, y - ay), math.hypot(x - bx, y - by)
+    off = abs(area(ax, ay, bx, by, x, y))
+    is_inside = (x - ax) * (bx - ax) + (y - ay) * (by - ay) > 0.0
+    is_inside = is_inside and (x - bx) * (ax - bx) + (y - by) * (ay - by) > 0.0
+    return is_inside and off <= straight * math.hypot(bx - ax, by - ay) * min(to_a, to_b)
+
+
+@kernel
+def run_at(links: Ints, portals: Ints, i: int, side: int) -> tuple[int, int]:
+    """Return the first and the last of the portals around portal i that share its end on a side."""
+    end = TAIL if side == LEFT else HEAD
+    first, last, v = i, i, links[portals[i], end]
+    while first > 0 and links[portals[first - 1], end] == v:
+        first -= 1
+    while last + 1 < len(portals) and links[portals[last + 1], end] == v:
+        last += 1
+    return first, last
+
+
+@kernel
+def fan_at(topology: Topology, portal: int, side: int) -> tuple[int, float]:
+    """Return the number of faces all around the end of a portal on a side, and their angle.
+
+    None, where a hole is among them.
+    """
+    h, count, angle = portal, 0, 0.0
+    while True:
+        angle += angle_at(topology.geometry, h, side)
+        count += 1
+        h = next_portal(topology.links, h, side)
+        if h < 0:
+            return 0, angle
+        if h == portal:
+            return count, angle
+
+
+@kernel
+def angle_in_strip(topology: Topology, strip: Strip, string: String, k: int) -> float:
+    """Angle at bend k between the parts of the string before and after it, through the strip."""
+    ends, bends, sides = string.ends, string.bends, string.sides
+    side, portals = sides[k], strip.portals
+    here, there = (0, 2) if side == LEFT else (2, 0)
+    first, last = run_at(topology.links, portals, bends[k], side)
+    bx, by = ends[first, here], ends[first, here + 1]
+    px, py, after, column = 0.0, 0.0, len(portals), 0
+    if k > 0:
+        before = 0 if sides[k - 1] == LEFT else 2
+        px, py = ends[bends[k - 1], before], ends[bends[k - 1], before + 1]
+    if k + 1 < len(bends):
+        after, column = bends[k + 1], 0 if sides[k + 1] == LEFT else 2
+    ax, ay = ends[first, there] - bx, ends[first, there + 1] - by
+    angle = angle_between(px - bx, py - by, ax, ay)
+    for i in range(first, last):
+        angle += angle_at(topology.geometry, portals[i], side)
+    ax, ay = ends[last, there] - bx, ends[last, there + 1] - by
+    return angle + angle_between(ax, ay, ends[after, column] - bx, ends[after, column + 1] - by)
+
+
+@kernel
+def points_of(strip: Strip, string: String) -> tuple[Longs, Floats]:
+    """Return where a string begins, crosses each portal, and ends: faces and weights in them.
+
+    At a bend they are those of the vertex, exactly.
+    """
+    portals, ends = strip.portals, string.ends
+    size = len(portals)
+    faces, weights = np.empty(size + 2, np.int64), np.zeros((size + 2, 3))
+    faces[0], weights[0] = strip.faces[0], strip.weights[0]
+    faces[size + 1], weights[size + 1] = strip.faces[1], strip.weights[1]
+    ax, ay, x, y, k = 0.0, 0.0, 0.0, 0.0, 0  # the part of the string begins at a, and goes on at x
+    for i in range(size):
+        h, lx, ly, rx, ry = portals[i], ends[i, 0], ends[i, 1], ends[i, 2], ends[i, 3]
+        bend, column = size, 0
+        if k < len(string.bends):
+            bend, column = string.bends[k], 0 if string.sides[k] == LEFT else 2
+        bx, by = ends[bend, column], ends[bend, column + 1]
+        share = share_crossed(ax, ay, bx, by, x, y, lx, ly, rx, ry)
+        x, y = lx + share * (rx - lx), ly + share * (ry - ly)
+        if bend < size and ends[i, column] == bx and ends[i, column + 1] == by:
+            share, x, y = column / 2.0, bx, by
+            last = i + 1 == size or ends[i + 1, column] != bx or ends[i + 1, column + 1] != by
+            if last and i >= bend:
+                ax, ay, k = bx, by, k + 1
+        faces[i + 1] = h // 3
+        weights[i + 1, h % 3], weights[i + 1, (h + 1) % 3] = 1.0 - share, share
+    return faces, weights
+
+
+@inlined
+def share_crossed(
+    ax: float, ay: float, bx: float, by: float, x: float, y: float, lx: float, ly: float, rx: float,
+    ry: float,
+) -> float:  # fmt: skip
+    """Share of the portal from l to r at which the line from a to b crosses it.
+
+    Of a portal along the line it is the point nearest to (x, y), which the line has come to.
+    """
+    left, right = area(ax, ay, bx, by, lx, ly), area(ax, ay, bx, by, rx, ry)
+    dx, dy = rx - lx, ry - ly
+    if left - right > 1e-14 * (abs(bx - ax) + abs(by - ay)) * (abs(dx) + abs(dy)):
+        share = left / (left - right)
     else:
-        h = links[previous(entered), OPPOSITE]
-        goal = following(strip[last])
-    if h == goal:
-        # One face on both sides: the rest of the strip must begin and end where it did.
-        if (
-            last + 1 == size
-            and first > 0
-            and links[strip[first - 1], APEX] != links[strip[last], APEX]
-        ):
-            return -1
-        if first == 0 and last + 1 < size:
-            h_after = links[strip[last + 1], OPPOSITE]
-            if links[h_after, APEX] != links[entered, APEX]:
-                return -1
-    is_end, row = first == 0, begin
-    while h >= 0:
-        if h == goal and last + 1 == size:
-            return row
-        if not is_end:
-            if row >= len(other):
-                return -1
-            other[row] = h
-            row += 1
-        if h == goal:
-            return row
-        is_end = False
-        h = links[following(h) if side == LEFT else previous(h), OPPOSITE]
-    return -1
+        share = ((x - lx) * dx + (y - ly) * dy) / (dx * dx + dy * dy)
+    return min(max(share, 0.0), 1.0)

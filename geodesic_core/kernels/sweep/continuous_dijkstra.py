@@ -1,10 +1,9 @@
 """The continuous-Dijkstra loop (section 3.4), resumable in slices."""
 
-import math
-
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.kernels.front.bounds import Bounds
 from geodesic_core.kernels.front.counters import (
+    ADDED,
     HEAP_SIZE,
     RING_HEAD,
     RING_SIZE,
@@ -21,6 +20,7 @@ from geodesic_core.kernels.front.state import (
     IN_RING,
     LIST,
     MARKS,
+    SEEN,
     SETTLED,
     SIZE,
     View,
@@ -46,6 +46,7 @@ from geodesic_core.kernels.mesh.half_edges import (
 )
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.sweep.delivery import DELIVERY
+from geodesic_core.kernels.sweep.further_sources import queue_waiting
 from geodesic_core.kernels.sweep.propagation import propagate_list
 from geodesic_core.kernels.sweep.pseudosources import emit_pseudosource, is_pseudosource
 
@@ -92,13 +93,22 @@ def advance(topology: Topology, wavefront: Wavefront, bounds: Bounds, budget: in
     wave = view_of(topology, wavefront, bounds)
     wave.counters[WORK] = 0
     outcome = drain(wave, budget)
-    while outcome == Outcome.FINISHED and wave.counters[HEAP_SIZE] > 0:
+    while outcome == Outcome.FINISHED and is_unfinished(wave):
         if wave.counters[WORK] >= budget:
             return Outcome.RUNNING
-        outcome = settle_nearest(wave)
+        if wave.counters[HEAP_SIZE] > 0:
+            outcome = settle_nearest(wave)
         if outcome == Outcome.FINISHED:
             outcome = drain(wave, budget)
     return outcome
+
+
+@inlined
+def is_unfinished(wave: View) -> bool:
+    """Whether vertices are to be settled, or else lists propagated that still waited."""
+    if wave.counters[HEAP_SIZE] > 0:
+        return True
+    return wave.counters[ADDED] > 0 and queue_waiting(wave) > 0
 
 
 @kernel
@@ -135,7 +145,7 @@ def settle_nearest(wave: View) -> Outcome:
         across = mesh.links[ROW * h + OUT_RIGHT]
         if across >= 0 and wave.pool.lists[LIST * across + SIZE] > 0:
             far = mesh.links[ROW * across + APEX]
-            if vertices.status[far] != FAR:
+            if vertices.status[far] >= FRONT:
                 queue_list(wave, across)
         elif across == IRREGULAR:
             queue_lists_beyond(wave, following(h))
@@ -162,7 +172,7 @@ def queue_lists_beyond(wave: View, g: int) -> None:
     mesh = wave.mesh
     h = mesh.links[ROW * g + AROUND] >> 1
     while h != g:
-        if wave.vertices.status[mesh.links[ROW * h + APEX]] != FAR:
+        if wave.vertices.status[mesh.links[ROW * h + APEX]] >= FRONT:
             queue_list(wave, h)
         h = mesh.links[ROW * h + AROUND] >> 1
 
@@ -185,8 +195,8 @@ def mark_front(wave: View, v: int) -> None:
     """Mark v as a neighbour of a settled vertex. Modifies its status."""
     vertices = wave.vertices
     if vertices.status[v] == FAR:
-        if vertices.distance[v] == math.inf:
-            touch(wave, v)
+        touch(wave, v)
+    if vertices.status[v] == SEEN:
         vertices.status[v] = FRONT
 
 

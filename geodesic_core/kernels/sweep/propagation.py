@@ -10,7 +10,9 @@ from geodesic_core.kernels.front.counters import (
     WORK,
 )
 from geodesic_core.kernels.front.pool import free_windows
+from geodesic_core.kernels.front.pruning import touch
 from geodesic_core.kernels.front.state import (
+    FAR,
     LIST,
     MARKS,
     RETAINED,
@@ -70,7 +72,9 @@ def propagate_list(wave: View, h: int) -> Outcome:
     counters[PROPAGATED] += count
     counters[WORK] += WORK_OF_WINDOW * size + WORK_OF_LIST
     if count > 0:
-        row = ROW * h
+        row, apex = ROW * h, mesh.links[ROW * h + APEX]
+        if wave.vertices.status[apex] == FAR:  # windows may pass it that do not improve it
+            touch(wave, apex)
         ax = mesh.geometry[row + COS_LEFT] * mesh.geometry[row + LENGTH_LEFT]
         ay = mesh.geometry[row + SIN_LEFT] * mesh.geometry[row + LENGTH_LEFT]
         nearest, crossing, least = reach_apex(wave, h, count, ax, ay)

@@ -29,6 +29,8 @@ QUESTIONS: list[tuple[str, dict[str, Any], list[str]]] = [
     ("paths", {"source": {"polyline": [FAR]}, "targets": [FAR]}, ["Point 0 of the source"]),
     ("isolines", {"sources": [FAR], "count": 2}, ["Source 0"]),
     ("borders", {"sources": [NEAR, FAR]}, ["Source 1"]),
+    ("samples", {"count": 3, "starts": [NEAR, FAR]}, ["Start 1"]),
+    ("cells", {"sources": [NEAR, FAR]}, ["Source 1"]),
     ("nearest", {"source": 0, "candidates": [NEAR, FAR]}, ["Candidate 1"]),
     ("log_map", {"source": FAR, "x_axis": 3}, ["The source"]),
     ("trace", {"starts": [NEAR, FAR], "directions": [0.1], "lengths": [0.1]}, ["Start 1"]),

@@ -1,0 +1,118 @@
+"""A mesh cut along curves: a new mesh, and the way back to the old one."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import chain
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import geodesic_core as gc
+from app.encoding import JSON, Answer, Surface
+from app.errors import Fault, pointer
+from app.queries.base import ExecutionContext, Query
+from app.queries.cost_model import PER_FACE_STORED, PER_POINT
+from app.queries.points import SurfacePoints, numbered, to_point_or_curve
+from app.queries.validation import FAULTS_SHOWN, WrittenPoints, invalid_points, naming
+from app.schemas.requests import CutRequest
+from app.store.meshes import CUT_ARRAYS, OpenMesh, content_hash
+
+_SNAPPING = 2.0**-30
+"""Weight up to which a point counts as on the edge where that weight is 0, see `gc.cut`"""
+
+
+class CutQuery(Query[CutRequest]):
+    """The mesh cut along ``curves``."""
+
+    kind = "cut"
+    model = CutRequest
+    offers = (JSON,)
+
+    def written_points(self) -> WrittenPoints:
+        """Yield the points of all curves."""
+        return chain.from_iterable(
+            numbered(pointer("curves", i, "polyline"), curve.polyline)
+            for i, curve in enumerate(self.request.curves)
+        )
+
+    def rough_seconds(self) -> float:
+        """Return the cost of the points, and of a new mesh."""
+        points = sum(len(curve.polyline) for curve in self.request.curves)
+        return PER_POINT * points + PER_FACE_STORED * self.size.faces
+
+    def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
+        """Cut the mesh; the answer is that of a service, with the mesh and its arrays as views."""
+        cut, about = self._cut(opened, points, context)
+        arrays = {**cut.mesh.arrays(), **arrays_of(cut)}
+        own = {"faces", "lengths", *CUT_ARRAYS}
+        if opened.mesh.has_positions:
+            own.add("vertices")
+        return replace(
+            self.told(content_hash(arrays, self.mesh_id), about),
+            surface=Surface(cut.vertices, cut.faces),
+            named={name: array for name, array in arrays.items() if name in own},
+        )
+
+    def make(
+        self, opened: OpenMesh, context: ExecutionContext
+    ) -> tuple[gc.CutMesh, dict[str, Any]]:
+        """Return the cut mesh, and what the answer tells of it; raises as `answer`."""
+        points = self.resolved(opened.mesh, context.cancel)
+        return self._cut(self.noted(opened, points), points, context)
+
+    def told(self, mesh_id: str, about: Mapping[str, Any]) -> Answer:
+        """Return the answer that names the new mesh, once that is stored."""
+        names = {"kind": self.kind, "mesh_id": self.mesh_id, "cut_mesh_id": mesh_id}
+        return Answer({**names, **about})
+
+    def _cut(
+        self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext
+    ) -> tuple[gc.CutMesh, dict[str, Any]]:
+        given = list(self._split(points))
+        curves = [self._curve(opened.mesh, i, own) for i, own in enumerate(given)]
+        with naming((gc.errors.InvalidMesh, "/curves")):
+            cut = gc.cut(opened.mesh, curves, self.request.separate, **context.options)
+        about = self.members(
+            opened,
+            vertices=len(cut.vertices),
+            faces=len(cut.faces),
+            parts=int(cut.parts.max()) + 1,
+            snapped=_snapped(given),
+        )
+        return cut, about
+
+    def _split(self, points: SurfacePoints) -> Iterator[SurfacePoints]:
+        """Yield the points of each curve."""
+        rest = iter(points)
+        for curve in self.request.curves:
+            yield [next(rest) for _ in curve.polyline]
+
+    def _curve(self, mesh: gc.TriangleMesh, number: int, points: SurfacePoints) -> gc.Curve:
+        """Return a curve for the library; a closed one ends where it begins."""
+        written = self.request.curves[number]
+        place = pointer("curves", number)
+        curve = to_point_or_curve(mesh, place, written, points)
+        assert isinstance(curve, gc.Curve), "that is what was written"  # noqa: S101
+        if not written.closed:
+            return curve
+        if not gc.share_a_face(mesh, points[-1], points[0]):
+            message = "the last point shares no face with the first, so that no segment joins them"
+            raise invalid_points([Fault(f"{place}/closed", message)])
+        return gc.Curve((*points, points[0]))
+
+
+def arrays_of(cut: gc.CutMesh) -> Mapping[str, NDArray[Any]]:
+    """Return the arrays that lead from a cut mesh back to the old one, by name."""
+    return {name: getattr(cut, name) for name in CUT_ARRAYS}
+
+
+def _snapped(curves: Sequence[SurfacePoints]) -> dict[str, Any]:
+    """Return the points that are nearly on a vertex or an edge: their number, and the first."""
+    found = [
+        (i, k)
+        for i, points in enumerate(curves)
+        for k, weights in enumerate(np.array([point.barycentric for point in points]))
+        if ((weights > 0.0) & (weights <= _SNAPPING)).any()
+    ]
+    return {"count": len(found), "ids": found[:FAULTS_SHOWN]}

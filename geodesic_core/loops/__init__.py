@@ -1,0 +1,1 @@
+"""Curves pulled tight, loops that cannot be shrunk, and paths around obstacles."""

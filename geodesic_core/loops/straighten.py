@@ -1,0 +1,243 @@
+"""Curves pulled tight: each becomes a strip of faces, and the strip leads to the straight curve.
+
+A loop is pulled tight from a base, as an open curve from there to itself. Then one of its bends
+becomes the base, until that gains nothing: it is straight wherever it can be. A loop without bends
+is a straight line in its unrolled strip. Once around, the strip is turned about a centre: beside
+that centre, the loop passes the vertex that is farthest from it.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from geodesic_core.arrays import Floats, Ints, Longs
+from geodesic_core.control import Control
+from geodesic_core.errors import InternalError, NoLoop
+from geodesic_core.kernels.mesh.half_edges import HEAD, OPPOSITE, TAIL
+from geodesic_core.kernels.mesh.locations import drop_repeats
+from geodesic_core.kernels.paths import funnel
+from geodesic_core.kernels.paths.funnel import LEFT, NEITHER, RIGHT, String, Strip
+from geodesic_core.mesh.surface_curve import SurfaceCurve, length_on, located_in, rows_of
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.tolerances import MOST_PASSES, SHORTER, TAUT
+
+
+class _Line(NamedTuple):
+    """The segments of a curve, from a point to the next."""
+
+    faces: Longs
+    """(N,) inner faces"""
+    starts: Floats
+    """(N, 3) weights in them"""
+    ends: Floats
+
+    def part(self, first: int, end: int) -> "_Line":
+        """Return some of the segments."""
+        return _Line(self.faces[first:end], self.starts[first:end], self.ends[first:end])
+
+    def turned(self, first: int) -> "_Line":
+        """Return the segments of a closed curve that begins with another one."""
+        return _joined([self.part(first, len(self.faces)), self.part(0, first)])
+
+    def strips(self, mesh: TriangleMesh) -> list[Strip]:
+        """Return strips along the line: more than one where it passes from one sheet to another."""
+        strips, first = [], 0
+        while first < len(self.faces):
+            strip, first = funnel.strip_along(mesh.topology, *self, first)
+            strips.append(strip)
+        return strips
+
+    def first_break(self, mesh: TriangleMesh) -> int | None:
+        """Return the first segment of a closed curve that no strip joins to those before."""
+        again = _joined([self, self.part(0, 1)])
+        first = funnel.strip_along(mesh.topology, *again, 0)[1]
+        return None if first == len(again.faces) else first % len(self.faces)
+
+
+def _joined(lines: Sequence[_Line]) -> _Line:
+    return _Line(
+        np.concatenate([line.faces for line in lines]),
+        np.concatenate([line.starts for line in lines]),
+        np.concatenate([line.ends for line in lines]),
+    )
+
+
+def straightened_curve(curve: SurfaceCurve, control: Control) -> SurfaceCurve:
+    """Return a curve pulled tight.
+
+    Raises
+    ------
+    InvalidArgument
+        The curve has no mesh, or was resampled.
+    NoLoop
+        It is closed and shrinks to a point.
+    Cancelled, DeadlineExceeded
+        As the control says.
+    """
+    pieces = None
+    while pieces is None or pieces > 1:
+        mesh, starts, ends = curve._segments()
+        line = _Line(curve._inner_faces, starts, ends)
+        if len(line.faces) == 0:
+            break
+        first = line.first_break(mesh) if curve.closed else 0
+        if first is None:
+            return straight_loop(mesh, line.strips(mesh)[0], control)
+        strips = line.turned(first).strips(mesh)
+        if pieces is not None and len(strips) >= pieces:
+            break
+        # Where a piece between two sheets has shrunk to nothing, those beside it may be one
+        pieces = len(strips)
+        pulled = [_straightened(mesh, strip) for strip in strips]
+        curve = curve_in(mesh, pulled, closed=curve.closed)
+    if curve.closed and len(curve.faces) == 0:
+        raise _shrunk()
+    return curve
+
+
+def loop_of(mesh: TriangleMesh, portals: Ints, control: Control) -> SurfaceCurve:
+    """Return the straight loop through a cycle of faces, which are entered over portals."""
+    return straight_loop(mesh, _based(mesh, portals, 0, LEFT), control)
+
+
+def straight_loop(mesh: TriangleMesh, strip: Strip, control: Control) -> SurfaceCurve:
+    """Return the loop pulled tight in whose strip both ends are one point.
+
+    Each round but the last makes it shorter, by more than SHORTER of its length.
+    """
+    length, best = np.inf, None
+    for _ in range(MOST_PASSES):
+        control.checkpoint(0.0)
+        strip, string = _straightened(mesh, strip)
+        if len(strip.portals) == 0:
+            raise _shrunk()
+        if best is not None and string.length >= length * (1.0 - SHORTER):
+            return curve_in(mesh, [best], closed=True)
+        length, best = string.length, (strip, string)
+        base = _at_bend(mesh, strip, string) if len(string.bends) else _beside(mesh, strip, string)
+        if base is None:
+            return curve_in(mesh, [best], closed=True)
+        strip = base
+    raise _endless()
+
+
+def _straightened(mesh: TriangleMesh, strip: Strip) -> tuple[Strip, String]:
+    passes = MOST_PASSES + len(mesh.faces)
+    strip, string, is_done = funnel.straightened(mesh.topology, strip, TAUT, 0.0, passes)
+    if not is_done:
+        raise _endless()
+    return strip, string
+
+
+def _shrunk() -> NoLoop:
+    return NoLoop("the curve shrinks to a point: no loop of its kind is shortest")
+
+
+def _endless() -> InternalError:
+    return InternalError("a curve is not straight after many passes; please report this mesh")
+
+
+def _at_bend(mesh: TriangleMesh, strip: Strip, string: String) -> Strip:
+    """Return the strip of a loop whose base is the bend in the middle."""
+    middle = len(string.bends) // 2
+    _, junction = next(_junctions(mesh, strip))
+    portals = np.concatenate([strip.portals, junction])
+    return _based(mesh, portals, int(string.bends[middle]), int(string.sides[middle]))
+
+
+def _beside(mesh: TriangleMesh, strip: Strip, string: String) -> Strip | None:
+    """Return the strip of a loop without bends whose base is a vertex that it passes when shorter.
+
+    None where it is straight at its base as well. The loop leads from the origin to x. Around it,
+    the strip is turned by some angle about a centre, which takes the origin to x; the loop turns at
+    its base by as much. It is shorter nearer to the centre, as far as vertices let it.
+    """
+    x, y = string.ends[-1, :2].tolist()
+    for side, junction in _junctions(mesh, strip):
+        portals = np.concatenate([strip.portals, junction])
+        ends = _unrolled(mesh, strip, portals)
+        (ax, ay), (bx, by) = (ends[i, 2:] - ends[i, :2] for i in (0, len(portals)))
+        turn = np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
+        if abs(turn) <= TAUT or side == (LEFT if turn > 0.0 else RIGHT):
+            continue
+        centre = 0.5 * np.array([x, y]) + np.array([-y, x]) / (2.0 * np.tan(0.5 * turn))
+        inner = ends[: len(portals), :2] if turn > 0.0 else ends[: len(portals), 2:]
+        farthest = int((inner * (inner - 2.0 * centre)).sum(axis=1).argmax())
+        return _based(mesh, portals, farthest, LEFT if turn > 0.0 else RIGHT)
+    return None
+
+
+def _unrolled(mesh: TriangleMesh, strip: Strip, portals: Ints) -> Floats:
+    """Return the ends of the portals of a cycle, the first of which comes again at its end."""
+    again = np.append(portals, portals[:1])
+    faces = np.array([strip.faces[0], again[-1] // 3])
+    weights = np.stack([strip.weights[0], np.full(3, 1.0 / 3.0)])
+    _, string, _ = funnel.straightened(mesh.topology, Strip(again, faces, weights), TAUT, 0.0, 0)
+    return string.ends
+
+
+def _junctions(mesh: TriangleMesh, strip: Strip) -> Iterator[tuple[int, Ints]]:
+    """Yield the ways from the end of a loop's strip to its beginning.
+
+    They are the portals, and the side on which the base is: NEITHER where it is no vertex.
+    """
+    topology, (first, last), (start, end) = mesh.topology, strip.faces, strip.weights
+    corners = np.flatnonzero(end == 1.0)
+    if first == last or len(corners) == 0:
+        line = _Line(strip.faces[::-1].copy(), np.stack([end, start]), np.stack([end, start]))
+        yield NEITHER, line.strips(mesh)[0].portals
+        return
+    corner = int(corners[0])
+    v = topology.links[3 * last + corner, TAIL]
+    room = int(topology.first_corner[v + 1] - topology.first_corner[v])
+    for side in (LEFT, RIGHT):
+        portals = np.empty(room, np.int32)
+        row, _ = funnel.around_vertex(topology, int(last), corner, int(first), side, portals, 0)
+        if row >= 0:
+            yield side, portals[:row]
+
+
+def _based(mesh: TriangleMesh, portals: Ints, i: int, side: int) -> Strip:
+    """Return the strip of a loop through a cycle of portals, whose base is an end of one."""
+    links, portals = mesh.topology.links, np.roll(portals, -i)
+    v = links[portals[0], TAIL if side == LEFT else HEAD]
+    face = int(links[portals[0], OPPOSITE]) // 3
+    weights = (links[3 * face : 3 * face + 3, TAIL] == v).astype(np.float64)
+    return Strip(portals, np.array([face, face]), np.stack([weights, weights]))
+
+
+def curve_in(
+    mesh: TriangleMesh, strips: Sequence[tuple[Strip, String]], *, closed: bool
+) -> SurfaceCurve:
+    """Return the curve of strings, each of which begins where the one before ends."""
+    parts = [funnel.points_of(strip, string) for strip, string in strips]
+    faces, weights = (np.concatenate(rows) for rows in zip(*parts, strict=True))
+    return curve_through(mesh, faces, weights, faces[:-1], closed=closed)
+
+
+def curve_through(
+    mesh: TriangleMesh, faces: Longs, weights: Floats, between: Longs, *, closed: bool
+) -> SurfaceCurve:
+    """Return the curve through points of inner faces; a closed one ends where it begins.
+
+    ``between`` holds the inner faces of its segments. Points that repeat are left out.
+    """
+    located = located_in(mesh, faces, weights)
+    outer = np.empty(len(between), np.int32)
+    crossed = between[::-1].astype(np.int32)
+    count = drop_repeats(mesh.topology.outer_face, crossed, located, outer)
+    located = rows_of(located, slice(0, count - 1 if closed and count > 1 else count))
+    outer = outer[: count - 1]
+    length = length_on(mesh, located, outer, closed)
+    return SurfaceCurve(mesh, outer, closed, length, located)
+
+
+def portals_along(*curves: SurfaceCurve, closed: bool) -> Ints:
+    """Return the portals along curves, each of which begins where the one before ends.
+
+    If they are closed, also those around the point where they meet again.
+    """
+    lines = [_Line(each._inner_faces, *each._segments()[1:]) for each in curves]
+    line = _joined([*lines, lines[0].part(0, 1)] if closed else lines)
+    return line.strips(curves[0].on_mesh())[0].portals

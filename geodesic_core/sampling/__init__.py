@@ -1,0 +1,1 @@
+"""Points spread over a surface, and points in the middle of others."""
