@@ -253,6 +253,23 @@ def test_more_points_than_there_are(client: TestClient, book: str) -> None:
     assert "only" in problem["detail"]
 
 
+def test_a_vertex_in_barriers_only(client: TestClient, plane: str) -> None:
+    mesh = stored_mesh(client, plane)
+    walls = np.flatnonzero((mesh.faces == 0).any(axis=1)).tolist()
+    for link, body, place in (
+        ("samples", {"count": 1, "starts": [0], "iterations": 1}, "/starts"),
+        ("mean", {"points": [0]}, "/points"),
+        ("log-map", {"source": 0}, "/source"),
+    ):
+        refused = ask(client, plane, link, **body, barriers=walls)
+        problem = check_problem(refused, 422, "invalid_point")
+        assert problem["errors"][0]["pointer"].startswith(place), link
+    cells = ask(client, plane, "cells", sources=[0, 60], barriers=walls).json()
+    assert cells["areas"][1] == pytest.approx(np.delete(mesh.face_areas, walls).sum(), rel=1e-12)
+    assert (cells["areas"][0], cells["centroids"][0]) == (0.0, None)
+    assert "Source 0" in cells["warnings"][0]
+
+
 def test_where_directions_have_no_meaning(client: TestClient, book: str) -> None:
     spine = {"edge": [0, 1], "t": 0.5}
     for link, body, place in (
