@@ -38,6 +38,7 @@ _OPTIONS = {
     "points": "--at",
     "levels": "--level",
     "starts": "--from",
+    "weights": "--weight",
     "directions": "--direction",
     "lengths": "--length",
     "curves": "--along",

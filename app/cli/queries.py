@@ -522,7 +522,10 @@ COMMANDS = {
                 ],
                 0,
             ),
-            **_POINTS_OUT,
+            **_out(
+                "points go, too: .npy (x, y, z, face and weights), .csv or .json; - prints .csv.",
+                *(".npy", ".csv", ".json"),
+            ),
             "barriers": (Barriers, None),
         },
         {"starts": "start"},

@@ -32,8 +32,8 @@ class CellsQuery(FromSources[CellsRequest]):
     hint = "ask for fewer sources at once"
 
     def value_count(self) -> int:
-        """Return the number of values of the cells."""
-        return 2 * VALUES_OF_POINT * self.source_count
+        """Return the number of values of the sources, the cells and their neighbours, about."""
+        return 3 * VALUES_OF_POINT * self.source_count
 
     def rough_seconds(self) -> float:
         """Return the cost of three sweeps to the limit, of the borders, and of the cut mesh."""

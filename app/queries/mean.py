@@ -50,8 +50,11 @@ class MeanQuery(Query[MeanRequest]):
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Search from the best vertex on."""
         mesh = opened.mesh
-        with naming((gc.errors.NoPath, "/points"), (gc.errors.NoTangentPlane, "/points")):
-            found = gc.mean_point(mesh, points, self.request.weights, **context.options)
+        try:
+            with naming((gc.errors.NoTangentPlane, "/points")):
+                found = gc.mean_point(mesh, points, self.request.weights, **context.options)
+        except gc.errors.NoPath as error:
+            raise invalid_fields(["/points"], str(error)) from None
         members = self.members(
             opened,
             points=[describe_point(mesh, point) for point in points],

@@ -3,8 +3,12 @@
 import math
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 import geodesic_core as gc
-from app.encoding import CSV, JSON, Answer, Indices
+from app.encoding import CSV, JSON, NPY, OCTETS, Answer, Indices
+from app.errors import Fault, problem
 from app.queries.base import VALUES_OF_POINT, ExecutionContext, Query
 from app.queries.cost_model import (
     PER_POINT,
@@ -17,7 +21,6 @@ from app.queries.points import SurfacePoints, describe_point, numbered
 from app.queries.validation import (
     WrittenPoints,
     check_count,
-    check_json_size,
     invalid_fields,
     naming,
 )
@@ -33,22 +36,28 @@ class SamplesQuery(Query[SamplesRequest]):
 
     kind = "samples"
     model = SamplesRequest
-    offers = JSON, CSV
-    hint = "ask for fewer points, or for CSV"
+    offers = JSON, NPY, OCTETS, CSV
 
     @classmethod
     def normalized(cls, request: SamplesRequest) -> SamplesRequest:
-        """Refuse a request that does not say how many points there shall be."""
+        """Name each included array once; refuse a request that does not say how many points."""
         if request.count is None and request.radius is None:
             raise invalid_fields(["/count", "/radius"], "give at least one of the two")
-        if not request.starts:
-            return request.model_copy(update={"starts": [BareVertex(vertex=0)]})
-        return request
+        starts = request.starts or [BareVertex(vertex=0)]
+        included = list(dict.fromkeys(request.include))
+        return request.model_copy(update={"starts": starts, "include": included})
 
     def check_limits(self, settings: Settings) -> None:
         """Refuse too many points."""
         count = max(self.request.count or 0, len(self.request.starts))
         check_count("points", count, settings, "max_sources")
+
+    def check_format(self, media_type: str) -> None:
+        """Refuse distances where there is a row for each point."""
+        if self.request.include:
+            fault = Fault("/include", "distances do not come with rows of points; ask for json")
+            message = f"{media_type} holds the points alone"
+            raise problem("invalid_request", message, errors=(fault,))
 
     def value_count(self) -> int:
         """Return the number of values that are known before."""
@@ -74,7 +83,6 @@ class SamplesQuery(Query[SamplesRequest]):
             spread = gc.farthest_points(
                 mesh, request.count, request.radius, points, **context.part(0, parts).options
             )
-        check_json_size(VALUES_OF_POINT * len(spread), context.max_values, self.hint)
         found, distances, nearest = spread.points, spread.distances, spread.nearest
         moved: dict[str, Any] = {"costs": [], "converged": None}
         if request.iterations:
@@ -94,8 +102,25 @@ class SamplesQuery(Query[SamplesRequest]):
             covering_radius=reach if math.isfinite(reach) else None,
             **moved,
         )
-        large: tuple[str, ...] = ()
+        values = VALUES_OF_POINT * len(found)
         if "distances" in request.include:
-            large = "distances", "nearest"
             members |= {"distances": distances, "nearest": Indices(nearest)}
-        return Answer(members, large, ("points",), table=table_of_points("point", described))
+            values += 2 * len(distances)
+        return Answer(
+            members,
+            ("points",),
+            ("points",),
+            values,
+            table=table_of_points("point", described, None),
+            array=lambda: rows_of(mesh, found),
+        )
+
+
+def rows_of(mesh: gc.TriangleMesh, points: SurfacePoints) -> NDArray[np.float64]:
+    """Return position, face and weights of each point, (N, 7); positions that are none are NaN."""
+    rows = np.full((len(points), 7), np.nan)
+    for row, point in zip(rows, points, strict=True):
+        if mesh.has_positions:
+            row[:3] = mesh.position(point)
+        row[3:] = point.face_index, *point.barycentric
+    return rows

@@ -129,26 +129,27 @@ _MATRIX = "source", "target", "distance"
 
 
 def table_of_points(
-    index: str, found: Sequence[Mapping[str, Any] | None], value: str = "distance"
+    index: str, found: Sequence[Mapping[str, Any] | None], value: str | None = "distance"
 ) -> Table:
     """Return a row for each described point, numbered by ``index`` unless it has that member.
 
-    The second column is its member ``value``.
+    The second column is its member ``value``, if any.
     """
+    values = [] if value is None else [value]
 
     def rows() -> Iterator[Sequence[Any]]:
         for i, described in enumerate(found):
             each = described or {}
             yield (
                 each.get(index, i),
-                each.get(value),
+                *(each.get(name) for name in values),
                 *(each.get("position") or _NOTHING),
                 each.get("vertex"),
                 each.get("face"),
                 *each.get("barycentric", _NOTHING),
             )
 
-    return Table([index, value, *"xyz", "vertex", "face", *"uvw"], rows)
+    return Table([index, *values, *"xyz", "vertex", "face", *"uvw"], rows)
 
 
 _NOTHING = None, None, None

@@ -231,6 +231,10 @@ class Samples:
     """Sum of squared distances before and after each iteration; empty without iterations"""
     converged: bool | None
     """Whether the last iteration moved no point; None without iterations"""
+    distances: Floats | None = None
+    """(V,), from the nearest point; infinite where unreachable"""
+    nearest: Integers | None = None
+    """(V,), index of the nearest point; -1 where unreachable"""
 
 
 @dataclass(frozen=True)
@@ -489,13 +493,15 @@ def to_neighbours(response: httpx2.Response) -> list[Neighbour]:
 def to_samples(response: httpx2.Response) -> Samples:
     """Return points that were spread, from JSON."""
     members = response.json()
-    radii = [np.inf if radius is None else radius for radius in members["radii"]]
+    distances, nearest = members.get("distances"), members.get("nearest")
     return Samples(
         points=[_as_point(each) for each in members["points"]],
         positions=_positions_of(members["points"]),
-        radii=np.array(radii),
+        radii=_with_infinity(members["radii"]),
         costs=np.array(members["costs"], np.float64),
         converged=members["converged"],
+        distances=None if distances is None else _with_infinity(distances),
+        nearest=None if nearest is None else _with_minus_one(nearest),
     )
 
 

@@ -524,6 +524,7 @@ def samples(
     start: Point | Sequence[Point] = (),
     iterations: int = 0,
     barriers: Sequence[int] = (),
+    include: Sequence[Literal["distances"]] = (),
     progress: Progress = ignore_progress,
 ) -> Flow[Samples]:
     """Return points spread over a surface, each the farthest from those before.
@@ -531,8 +532,14 @@ def samples(
     Until there are ``count`` of them, or every vertex is within ``radius`` of one. They then move
     ``iterations`` times to the middle of what is nearest to each.
     """
-    body = _body(count=count, radius=radius, iterations=iterations, barriers=barriers)
-    body["starts"] = as_points(start)
+    body = _body(
+        count=count,
+        radius=radius,
+        starts=as_points(start),
+        iterations=iterations,
+        barriers=barriers,
+        include=include,
+    )
     return (yield from _ask(mesh, "samples", body, to_samples, progress))
 
 

@@ -152,6 +152,73 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/meshes/{mesh_id}/samples": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Points spread over the surface, each the farthest from those before
+         * @description Return points until there are `count` of them or each vertex is within `radius` of one.
+         *
+         *     They are vertices, but for those of `starts`. With `iterations` they then move to the middle of what is nearest
+         *     to each, and are points in faces.
+         */
+        post: operations["samplePoints"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/meshes/{mesh_id}/cells": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Areas, centroids and neighbours of the parts that are nearest to each source
+         * @description Return what the borders between the territories of sources enclose.
+         *
+         *     Areas sum to that of the surface, or of what is within `max_distance`.
+         */
+        post: operations["computeCells"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/meshes/{mesh_id}/mean": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * The mean of points on the surface
+         * @description Return the point whose squared distances from some points sum to the least.
+         *
+         *     It is also called their Karcher or Fréchet mean.
+         */
+        post: operations["findMean"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/meshes/{mesh_id}/cut": {
         parameters: {
             query?: never;
@@ -739,7 +806,7 @@ export interface components {
             max_distance?: number | null;
             /**
              * Chord Error
-             * @description Largest distance of the returned chords from the exact lines, which are mostly hyperbolas inside faces, in mesh units. At least a billionth of the bounding box's diagonal; a thousandth of the mean edge length if not given
+             * @description Largest distance of chords from the exact lines, which are mostly hyperbolas inside faces, in mesh units. At least a billionth of the bounding box's diagonal; a thousandth of the mean edge length if not given
              */
             chord_error?: number | null;
         };
@@ -823,6 +890,74 @@ export interface components {
              * @description The vertex at each point
              */
             vertices: number[];
+        };
+        /**
+         * CellsAnswer
+         * @description The cells of sources.
+         */
+        CellsAnswer: {
+            /**
+             * Kind
+             * @constant
+             */
+            kind: "cells";
+            /** Mesh Id */
+            mesh_id: string;
+            /** Chord Error */
+            chord_error: number;
+            /** Sources */
+            sources: (components["schemas"]["ResolvedSource"] | components["schemas"]["ResolvedCurveSource"])[];
+            /**
+             * Areas
+             * @description In mesh units squared; 0 where other sources are nearer everywhere
+             */
+            areas: number[];
+            /**
+             * Centroids
+             * @description The middle of each cell, `null` for one without area; null if a source is a curve
+             */
+            centroids: (components["schemas"]["ResolvedPoint"] | null)[] | null;
+            /** Neighbours */
+            neighbours: components["schemas"]["Neighbours"][];
+            /** Warnings */
+            warnings: string[];
+        };
+        /**
+         * CellsRequest
+         * @description The cells of ``sources``: what is nearer to each of them than to the others.
+         * @example {
+         *       "sources": [
+         *         {
+         *           "vertex": 0
+         *         },
+         *         {
+         *           "vertex": 7
+         *         }
+         *       ]
+         *     }
+         */
+        CellsRequest: {
+            /**
+             * Barriers
+             * @description Indices of blocked faces. They act as holes, and paths may bend at their corners. Default: `[]`
+             * @example [
+             *       7,
+             *       8
+             *     ]
+             */
+            barriers?: number[];
+            /** Sources */
+            sources: (number | components["schemas"]["VertexSource"] | components["schemas"]["EdgeSource"] | components["schemas"]["FaceSource"] | components["schemas"]["PositionSource"] | components["schemas"]["CurveSource"])[];
+            /**
+             * Max Distance
+             * @description Cells end at this distance, in mesh units
+             */
+            max_distance?: number | null;
+            /**
+             * Chord Error
+             * @description Largest distance of chords from the exact lines, which are mostly hyperbolas inside faces, in mesh units. At least a billionth of the bounding box's diagonal; a thousandth of the mean edge length if not given
+             */
+            chord_error?: number | null;
         };
         /**
          * Curve
@@ -1917,6 +2052,71 @@ export interface components {
             layout?: "dense" | "sparse" | "pairs";
         };
         /**
+         * MeanAnswer
+         * @description The mean of points on the surface: their Karcher mean.
+         */
+        MeanAnswer: {
+            /**
+             * Kind
+             * @constant
+             */
+            kind: "mean";
+            /** Mesh Id */
+            mesh_id: string;
+            /** Points */
+            points: components["schemas"]["ResolvedPoint"][];
+            mean: components["schemas"]["ResolvedPoint"];
+            /**
+             * Variance
+             * @description The weighted mean of the squared distances, in mesh units squared
+             */
+            variance: number;
+            /**
+             * Converged
+             * @description Whether no point near it is better
+             */
+            converged: boolean;
+            /**
+             * Moves
+             * @description How often the search moved
+             */
+            moves: number;
+            /** Warnings */
+            warnings: string[];
+        };
+        /**
+         * MeanRequest
+         * @description The point whose squared distances from ``points`` sum to the least.
+         * @example {
+         *       "points": [
+         *         {
+         *           "vertex": 0
+         *         },
+         *         {
+         *           "vertex": 7
+         *         }
+         *       ]
+         *     }
+         */
+        MeanRequest: {
+            /**
+             * Barriers
+             * @description Indices of blocked faces. They act as holes, and paths may bend at their corners. Default: `[]`
+             * @example [
+             *       7,
+             *       8
+             *     ]
+             */
+            barriers?: number[];
+            /** Points */
+            points: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[];
+            /**
+             * Weights
+             * @description One for each point; the same for all if not given
+             */
+            weights?: number[] | null;
+        };
+        /**
          * MeshDocument
          * @description The report of a mesh in the store.
          */
@@ -2148,6 +2348,25 @@ export interface components {
              * @description Candidates farther than this are left out
              */
             max_distance?: number | null;
+        };
+        /**
+         * Neighbours
+         * @description Two cells that share a border.
+         */
+        Neighbours: {
+            /**
+             * Sources
+             * @description Indices into `sources`, the lower one first
+             */
+            sources: [
+                number,
+                number
+            ];
+            /**
+             * Length
+             * @description The length of their border, in mesh units
+             */
+            length: number;
         };
         /**
          * PathAnswer
@@ -2602,6 +2821,105 @@ export interface components {
                 number,
                 number
             ])[];
+        };
+        /**
+         * SamplesAnswer
+         * @description Points spread over the surface.
+         */
+        SamplesAnswer: {
+            /**
+             * Kind
+             * @constant
+             */
+            kind: "samples";
+            /** Mesh Id */
+            mesh_id: string;
+            /** Points */
+            points: components["schemas"]["ResolvedPoint"][];
+            /**
+             * Radii
+             * @description The covering radius with the points of `starts`, and after each one added; `null` while a part of the surface has no point
+             */
+            radii: (number | null)[];
+            /**
+             * Covering Radius
+             * @description The distance of the farthest vertex from the nearest point, at the end
+             */
+            covering_radius: number | null;
+            /**
+             * Costs
+             * @description The sum of squared distances over the surface, before and after each iteration; never rising
+             */
+            costs: number[];
+            /**
+             * Converged
+             * @description Whether the last iteration moved no point; null if there were none
+             */
+            converged: boolean | null;
+            /**
+             * Distances
+             * @description For `include`: in mesh units, `null` where unreachable
+             */
+            distances?: (number | null)[] | null;
+            /**
+             * Nearest
+             * @description For `include`: index of the nearest point of each vertex
+             */
+            nearest?: (number | null)[] | null;
+            /** Warnings */
+            warnings: string[];
+        };
+        /**
+         * SamplesRequest
+         * @description Points spread over the surface, each the farthest from those before.
+         * @example {
+         *       "count": 20
+         *     }
+         * @example {
+         *       "iterations": 5,
+         *       "radius": 0.5,
+         *       "starts": [
+         *         {
+         *           "vertex": 0
+         *         }
+         *       ]
+         *     }
+         */
+        SamplesRequest: {
+            /**
+             * Barriers
+             * @description Indices of blocked faces. They act as holes, and paths may bend at their corners. Default: `[]`
+             * @example [
+             *       7,
+             *       8
+             *     ]
+             */
+            barriers?: number[];
+            /**
+             * Count
+             * @description The number of points, those of `starts` included
+             */
+            count?: number | null;
+            /**
+             * Radius
+             * @description The covering radius to reach, in mesh units. Give at least one of the two; the first that is reached counts
+             */
+            radius?: number | null;
+            /**
+             * Starts
+             * @description The points to begin with; vertex 0 if there are none. Default: `[]`
+             */
+            starts?: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[];
+            /**
+             * Iterations
+             * @description How often the points then move to the middle of what is nearest to each, by Lloyd's method; fewer if they converge. Default: `0`
+             */
+            iterations?: number;
+            /**
+             * Include
+             * @description `distances`: also the distance of each vertex from the nearest point, and the index of that. Default: `[]`
+             */
+            include?: "distances"[];
         };
         /**
          * SearchStep
@@ -3853,6 +4171,343 @@ export interface operations {
                     "application/json": string;
                     "model/obj": string;
                     "text/csv": string;
+                };
+            };
+            /** @description malformed_body, idempotency_key_unused, malformed_request */
+            400: components["responses"]["Problem"];
+            /** @description unauthorized */
+            401: components["responses"]["Unauthorized"];
+            /** @description origin_not_allowed */
+            403: components["responses"]["Problem"];
+            /** @description mesh_not_found */
+            404: components["responses"]["Problem"];
+            /** @description not_acceptable */
+            406: components["responses"]["Problem"];
+            /** @description upload_too_large, result_too_large */
+            413: components["responses"]["Problem"];
+            /** @description unsupported_media_type */
+            415: components["responses"]["Problem"];
+            /** @description range_not_satisfiable */
+            416: components["responses"]["Problem"];
+            /** @description host_not_allowed */
+            421: components["responses"]["Problem"];
+            /** @description invalid_point, not_embedded, invalid_request, limit_exceeded, memory_limit */
+            422: components["responses"]["Problem"];
+            /** @description quota_exceeded, rate_limited */
+            429: components["responses"]["ProblemForNow"];
+            /** @description header_too_large */
+            431: components["responses"]["Problem"];
+            /** @description worker_died, mesh_damaged, internal_error */
+            500: components["responses"]["Problem"];
+            /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
+            503: components["responses"]["ProblemForNow"];
+            /** @description deadline_exceeded */
+            504: components["responses"]["Problem"];
+            /** @description storage_full, quota_exceeded */
+            507: components["responses"]["Problem"];
+        };
+    };
+    samplePoints: {
+        parameters: {
+            query?: {
+                /** @description Overrides `Accept` */
+                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv";
+                /** @description Type of the numbers in `npy`, `npz` and `octets` */
+                dtype?: "float64" | "float32";
+            };
+            header?: {
+                /** @description The longest time that the client waits, in milliseconds; it bounds no job */
+                "x-timeout-ms"?: number;
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
+                prefer?: string;
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job. With `Prefer: respond-async` only */
+                "idempotency-key"?: string;
+                /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
+                Range?: string;
+            };
+            path: {
+                mesh_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SamplesRequest"];
+            };
+        };
+        responses: {
+            /** @description The points, in the order in which they were added. In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` names what is too long for one */
+            200: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "Geodesic-Dtype": components["headers"]["Geodesic-Dtype"];
+                    "Geodesic-Shape": components["headers"]["Geodesic-Shape"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SamplesAnswer"];
+                    "application/x-npy": string;
+                    "application/octet-stream": string;
+                    "text/csv": string;
+                };
+            };
+            /** @description With `Prefer: respond-async`: the job */
+            202: {
+                headers: {
+                    Location: components["headers"]["Location"];
+                    "Preference-Applied": components["headers"]["Preference-Applied"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobDocument"];
+                };
+            };
+            /** @description The requested range */
+            206: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Content-Range": components["headers"]["Content-Range"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": string;
+                    "application/x-npy": string;
+                    "application/octet-stream": string;
+                    "text/csv": string;
+                };
+            };
+            /** @description malformed_body, idempotency_key_unused, malformed_request */
+            400: components["responses"]["Problem"];
+            /** @description unauthorized */
+            401: components["responses"]["Unauthorized"];
+            /** @description origin_not_allowed */
+            403: components["responses"]["Problem"];
+            /** @description mesh_not_found */
+            404: components["responses"]["Problem"];
+            /** @description not_acceptable */
+            406: components["responses"]["Problem"];
+            /** @description upload_too_large, result_too_large */
+            413: components["responses"]["Problem"];
+            /** @description unsupported_media_type */
+            415: components["responses"]["Problem"];
+            /** @description range_not_satisfiable */
+            416: components["responses"]["Problem"];
+            /** @description host_not_allowed */
+            421: components["responses"]["Problem"];
+            /** @description invalid_point, not_embedded, invalid_request, limit_exceeded, memory_limit */
+            422: components["responses"]["Problem"];
+            /** @description quota_exceeded, rate_limited */
+            429: components["responses"]["ProblemForNow"];
+            /** @description header_too_large */
+            431: components["responses"]["Problem"];
+            /** @description worker_died, mesh_damaged, internal_error */
+            500: components["responses"]["Problem"];
+            /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
+            503: components["responses"]["ProblemForNow"];
+            /** @description deadline_exceeded */
+            504: components["responses"]["Problem"];
+            /** @description storage_full, quota_exceeded */
+            507: components["responses"]["Problem"];
+        };
+    };
+    computeCells: {
+        parameters: {
+            query?: {
+                /** @description Overrides `Accept` */
+                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv";
+                /** @description Type of the numbers in `npy`, `npz` and `octets` */
+                dtype?: "float64" | "float32";
+            };
+            header?: {
+                /** @description The longest time that the client waits, in milliseconds; it bounds no job */
+                "x-timeout-ms"?: number;
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
+                prefer?: string;
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job. With `Prefer: respond-async` only */
+                "idempotency-key"?: string;
+                /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
+                Range?: string;
+            };
+            path: {
+                mesh_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["CellsRequest"];
+            };
+        };
+        responses: {
+            /** @description The cells, in the order of the sources. In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` names what is too long for one */
+            200: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CellsAnswer"];
+                    "text/csv": string;
+                };
+            };
+            /** @description With `Prefer: respond-async`: the job */
+            202: {
+                headers: {
+                    Location: components["headers"]["Location"];
+                    "Preference-Applied": components["headers"]["Preference-Applied"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobDocument"];
+                };
+            };
+            /** @description The requested range */
+            206: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Content-Range": components["headers"]["Content-Range"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": string;
+                    "text/csv": string;
+                };
+            };
+            /** @description malformed_body, idempotency_key_unused, malformed_request */
+            400: components["responses"]["Problem"];
+            /** @description unauthorized */
+            401: components["responses"]["Unauthorized"];
+            /** @description origin_not_allowed */
+            403: components["responses"]["Problem"];
+            /** @description mesh_not_found */
+            404: components["responses"]["Problem"];
+            /** @description not_acceptable */
+            406: components["responses"]["Problem"];
+            /** @description upload_too_large, result_too_large */
+            413: components["responses"]["Problem"];
+            /** @description unsupported_media_type */
+            415: components["responses"]["Problem"];
+            /** @description range_not_satisfiable */
+            416: components["responses"]["Problem"];
+            /** @description host_not_allowed */
+            421: components["responses"]["Problem"];
+            /** @description invalid_point, not_embedded, invalid_request, limit_exceeded, memory_limit */
+            422: components["responses"]["Problem"];
+            /** @description quota_exceeded, rate_limited */
+            429: components["responses"]["ProblemForNow"];
+            /** @description header_too_large */
+            431: components["responses"]["Problem"];
+            /** @description worker_died, mesh_damaged, internal_error */
+            500: components["responses"]["Problem"];
+            /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
+            503: components["responses"]["ProblemForNow"];
+            /** @description deadline_exceeded */
+            504: components["responses"]["Problem"];
+            /** @description storage_full, quota_exceeded */
+            507: components["responses"]["Problem"];
+        };
+    };
+    findMean: {
+        parameters: {
+            query?: {
+                /** @description Overrides `Accept` */
+                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv";
+                /** @description Type of the numbers in `npy`, `npz` and `octets` */
+                dtype?: "float64" | "float32";
+            };
+            header?: {
+                /** @description The longest time that the client waits, in milliseconds; it bounds no job */
+                "x-timeout-ms"?: number;
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
+                prefer?: string;
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job. With `Prefer: respond-async` only */
+                "idempotency-key"?: string;
+                /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
+                Range?: string;
+            };
+            path: {
+                mesh_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["MeanRequest"];
+            };
+        };
+        responses: {
+            /** @description The point, and whether no other near it is better */
+            200: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MeanAnswer"];
+                };
+            };
+            /** @description With `Prefer: respond-async`: the job */
+            202: {
+                headers: {
+                    Location: components["headers"]["Location"];
+                    "Preference-Applied": components["headers"]["Preference-Applied"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobDocument"];
+                };
+            };
+            /** @description The requested range */
+            206: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Content-Range": components["headers"]["Content-Range"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": string;
                 };
             };
             /** @description malformed_body, idempotency_key_unused, malformed_request */

@@ -11,6 +11,7 @@ from geodesic_core.control import Control
 from geodesic_core.cutting.cut import cut_along
 from geodesic_core.cutting.cut_mesh import CutMesh
 from geodesic_core.cutting.lines import NO_LINE, as_line
+from geodesic_core.cutting.separation import parts_of
 from geodesic_core.errors import InvalidArgument
 from geodesic_core.fields.borders import Border
 from geodesic_core.fields.charts import charts_of
@@ -48,7 +49,8 @@ class Cells:
     cut: CutMesh
     """The mesh, cut apart along the borders."""
     cell_of: Ints
-    """(F',) int32: the source that each face of `cut` belongs to; -1 where unreachable."""
+    """(F',) int32: the source that each face of `cut` belongs to; -1 where unreachable, and in
+    barriers."""
 
     def __len__(self) -> int:
         return len(self.field.sources)
@@ -173,22 +175,25 @@ def _cell_of(field: "DistanceField", cut: CutMesh, max_distance: float, control:
     """Return the source of each face of a mesh that was cut apart along borders.
 
     No border crosses a part: all of it belongs to the source of any vertex off all borders, or of
-    any point inside.
+    any point inside. Barriers part the surface as borders do.
     """
-    parts, mesh = cut.parts, field.mesh
+    mesh = field.mesh
+    free = np.flatnonzero(~np.isin(cut.face_of, mesh.barriers))
+    vertices = cut.copy_of[cut.faces[free]]
+    parts = parts_of(vertices, cut.curve_edges)
     on_border = np.zeros(len(cut.vertices), bool)
     on_border[cut.copy_of[cut.curve_edges]] = True
-    vertices = cut.copy_of[cut.faces]
     tells = ~on_border[vertices] & (vertices < len(mesh.vertices))
     nearest = np.where(field.distances <= max_distance, field.nearest_source, -1)
     told, of_part = nearest[vertices[tells]], np.repeat(parts, 3)[tells.reshape(-1)]
     source_of = np.full(int(parts.max()) + 1, _UNKNOWN, np.int32)
     source_of[of_part] = told
     for part in control.watched(np.flatnonzero(source_of == _UNKNOWN)):
-        faces = np.flatnonzero(parts == part)
+        faces = free[parts == part]
         largest = int(faces[cut.mesh.face_areas[faces].argmax()])
         middle = cut.to_old(SurfacePoint.face(largest, (1 / 3, 1 / 3, 1 / 3)))
         is_within = field.distance_at(middle) <= max_distance
         source_of[part] = field.nearest_source_at(middle) if is_within else -1
-    found: Ints = source_of[parts]
+    found: Ints = np.full(len(cut.faces), -1, np.int32)
+    found[free] = source_of[parts]
     return found

@@ -83,6 +83,8 @@ def _at_vertex(mesh: TriangleMesh, point: SurfacePoint) -> Frame:
     v = topology.inner_vertex[point.vertex_index]
     if topology.flags[v] & FANS:
         raise _without_plane(point, "several fans of faces meet")
+    if topology.total_angle[v] == 0.0:
+        raise _without_plane(point, "no face is around it that is not blocked")
     nodes, lowest = np.array([v]), np.array([point.face_index])
     frames = vertex_frames(topology, mesh.faces, mesh.inner_face, nodes, lowest)
     is_closed, total = not topology.flags[v] & BOUNDARY, float(topology.total_angle[v])

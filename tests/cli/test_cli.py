@@ -633,6 +633,56 @@ def test_lines_go_straight_on(run: Run, plane: Path) -> None:
     assert [line["points"] for line in found] == [line.points.tolist() for line in expected]
 
 
+def test_points_are_spread_and_moved(run: Run, plane: Path) -> None:
+    mesh = gc.load_mesh(plane)
+    ran = run("farthest", plane, "--count", 5, "--from", 7, "--from", 60, "--out", "p.csv")
+    assert (ran.code, ran.err) == (0, "")
+    own = gc.farthest_points(mesh, 5, start=[7, 60])
+    assert [int(row["vertex"]) for row in rows_of("p.csv")] == own.vertices.tolist()
+    assert (ran.figure("points"), ran.figure("reach")) == ("5", repr(own.radius[-1].item()))
+    ran = run("farthest", plane, "--radius", 0.5, "--iterations", 3, "--out", "p.npy")
+    relaxed = gc.relax_points(mesh, gc.farthest_points(mesh, radius=0.5).points, 3)
+    places = [mesh.position(point) for point in relaxed.points]
+    np.testing.assert_array_equal(np.load("p.npy")[:, :3], places)
+    first, *_, last = relaxed.costs.tolist()
+    assert ran.figure("cost") == f"{first!r}, then {last!r}: not converged"
+
+
+def test_cells_and_means_are_the_library_s(run: Run, plane: Path) -> None:
+    mesh = gc.load_mesh(plane)
+    sources = ["--source", 0, "--source", 60, "--source", 99]
+    ran = run("cells", plane, *sources, "--max-distance", 0.4, "--out", "c.csv")
+    assert (ran.code, ran.err) == (0, "")
+    own = gc.exact_distance(mesh, [0, 60, 99], max_distance=0.4).cells()
+    assert [float(row["area"]) for row in rows_of("c.csv")] == own.areas.tolist()
+    assert f"of source 2: {own.areas[2].item()!r}" in ran.out
+    assert ran.figure("neighbours") == f"{len(own.adjacency)} pairs"
+    points = ["--at", 3, "--at", 60, "--at", 115]
+    ran = run("mean", plane, *points, *("--weight", 1) * 2, "--weight", 2.5, "--out", "m.json")
+    mean = gc.mean_point(mesh, [3, 60, 115], [1, 1, 2.5])
+    assert ran.figure("variance").startswith(f"{mean.variance!r}, converged after {mean.moves}")
+    answer = json.loads(Path("m.json").read_text())
+    assert answer["mean"]["position"] == mesh.position(mean.point).tolist()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("farthest", "give --count or --radius, or both"),
+        ("farthest --count 500", "--count: count is 500, but only 121 points"),
+        ("farthest --count 3 --from 999", "--from 999: vertex 999 does not exist"),
+        ("cells --source 0 --source 999", "--source 999: vertex 999 does not exist"),
+        ("mean --at 0 --at 4 --weight 1", "--weight: give one for each of 2 points"),
+        ("mean --at 0 --at 4 --weight 0 --weight 0", "--weight: one must be above 0"),
+    ],
+)
+def test_samples_that_are_none(run: Run, plane: Path, arguments: str, message: str) -> None:
+    command, *rest = arguments.split()
+    ran = run(command, plane, *rest)
+    assert ran.code != 0
+    assert message in error_line(ran)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -1,5 +1,6 @@
 """The client with a service that runs, against the library."""
 
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -193,6 +194,59 @@ def test_log_maps_and_lines_are_the_library_s(
             np.testing.assert_array_equal(line.faces, own.faces)
             assert (line.length, line.stopped) == (own.length, own.stopped)
             assert line.end_direction == own.end_direction
+
+
+def test_samples_cells_and_means_are_the_library_s(
+    service: Client, mesh: Mesh, same: gc.TriangleMesh
+) -> None:
+    found = service.samples(mesh, 6, start=[7, 3], barriers=[5], include=["distances"])
+    spread = gc.farthest_points(same, 6, start=[7, 3], barriers=[5])
+    assert [point["vertex"] for point in found.points] == spread.vertices.tolist()
+    np.testing.assert_array_equal(found.positions, same.vertices[spread.vertices])
+    np.testing.assert_array_equal(found.radii, spread.radius)
+    np.testing.assert_array_equal(found.distances, spread.distances)
+    np.testing.assert_array_equal(found.nearest, spread.nearest)
+    assert (found.costs.tolist(), found.converged) == ([], None)
+    moved = service.samples(mesh, radius=2.0, iterations=2)
+    own = gc.relax_points(same, gc.farthest_points(same, radius=2.0).points, 2)
+    np.testing.assert_array_equal(moved.costs, own.costs)
+    assert (moved.converged, moved.distances, moved.nearest) == (own.converged, None, None)
+
+    cells = service.cells(mesh, moved.points, chord_error=0.01)  # which can be sent again
+    expected = gc.exact_distance(same, own.points).cells(0.01)
+    np.testing.assert_array_equal(cells.areas, expected.areas)
+    np.testing.assert_array_equal(cells.adjacency, expected.adjacency)
+    np.testing.assert_array_equal(cells.border_lengths, expected.border_lengths)
+    assert cells.centroids is not None
+    assert [point and point["face"] for point in cells.centroids] == [
+        point and point.face_index for point in expected.centroids
+    ]
+    assert service.cells(mesh, [curve([0, 1]), 900]).centroids is None
+
+    mean = service.mean(mesh, [3, 9, 700], weights=[1, 2, 0.5])
+    own_mean = gc.mean_point(same, [3, 9, 700], [1, 2, 0.5])
+    np.testing.assert_array_equal(mean.position, same.position(own_mean.point))
+    assert (mean.variance, mean.converged, mean.moves) == (
+        own_mean.variance,
+        own_mean.converged,
+        own_mean.moves,
+    )
+
+
+def test_points_of_a_surface_that_lies_nowhere(service: Client) -> None:
+    archive = BytesIO()
+    np.savez(archive, faces=[[0, 1, 2], [0, 2, 3]], lengths=np.ones((2, 3)))
+    flat = service.upload(archive.getvalue(), format="npz")
+    found = service.samples(flat, 2)
+    assert (found.positions.shape, len(found.points)) == ((0, 3), 2)
+    assert service.mean(flat, [0, 1]).position is None
+
+
+def test_parts_that_have_no_point_are_infinitely_far(service: Client, apart: Mesh) -> None:
+    found = service.samples(apart, 1, include=["distances"])
+    assert found.radii.tolist() == [np.inf]
+    assert found.nearest is not None
+    assert found.nearest.tolist() == [0] * 3 + [-1] * 3
 
 
 def test_points_that_were_located_are_points(service: Client, mesh: Mesh) -> None:

@@ -20,7 +20,7 @@ OFFERED = {
     "isolines": "json obj csv",
     "borders": "json obj csv",
     "boundaries": "json obj csv",
-    "samples": "json csv",
+    "samples": "json npy octets csv",
     "cells": "json csv",
     "mean": "json",
     "matrix": "json npy octets csv",

@@ -91,6 +91,25 @@ def test_what_lies_on_the_surface_is_the_library_s(client: TestClient, flat: str
     assert line["faces"] == expected_line.faces.tolist()
 
 
+def test_samples_cells_and_means_have_no_positions(client: TestClient, flat: str) -> None:
+    mesh = gc.TriangleMesh.from_lengths(*torus())
+    body = {"count": 5, "starts": [INSIDE], "iterations": 2}
+    samples = ask(client, flat, "samples", **body).json()
+    place = gc.SurfacePoint.face(40, (0.2, 0.3, 0.5))
+    own = gc.relax_points(mesh, gc.farthest_points(mesh, 5, start=place).points, 2)
+    assert samples["costs"] == own.costs.tolist()
+    rows = np.load(BytesIO(ask(client, flat, "samples", "?format=npy", **body).content))
+    assert np.isnan(rows[:, :3]).all()
+    assert rows[:, 3:].tolist() == [[at.face_index, *at.barycentric] for at in own.points]
+    cells = ask(client, flat, "cells", sources=[0, INSIDE, 20]).json()
+    expected = gc.exact_distance(mesh, [0, place, 20]).cells()
+    assert cells["areas"] == expected.areas.tolist()
+    mean = ask(client, flat, "mean", points=[0, 1, INSIDE]).json()
+    assert mean["variance"] == gc.mean_point(mesh, [0, 1, place]).variance
+    found = [*samples["points"], *cells["centroids"], mean["mean"]]
+    assert all(point["position"] is None for point in found)
+
+
 def test_lines_are_locations(client: TestClient, flat: str) -> None:
     mesh = gc.TriangleMesh.from_lengths(*torus())
     field = gc.exact_distance(mesh, [0, 20])

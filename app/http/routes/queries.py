@@ -135,7 +135,7 @@ OPERATIONS = (
         "one.\n\nThey are vertices, but for those of `starts`. With `iterations` they then move to "
         "the middle of what is nearest\nto each, and are points in faces.",
         "The points, in the order in which they were added",
-        (CSV,),
+        (NPY, OCTETS, CSV),
     ),
     Operation(
         "/cells",

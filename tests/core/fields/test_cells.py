@@ -75,6 +75,36 @@ def test_each_face_belongs_to_the_source_that_is_nearest(sample, limit):
     check_cells(mesh, field, field.cells())
 
 
+@pytest.mark.parametrize(("low", "high"), [(0.0, 0.3), (0.7, 1.0), (0.4, 0.6)])
+@pytest.mark.parametrize("sources", [[0, -1, 3], [0, 3]])
+def test_barriers_belong_to_no_cell(low, high, sources):
+    """Wherever they are, and where they part the surface; a side without a source as well."""
+    mesh = gc.samples.plane(800)
+    x = mesh.vertices[mesh.faces, 0].mean(axis=1)
+    walls = np.flatnonzero((x > low) & (x < high))
+    free = np.flatnonzero((x <= low) | (x >= high))
+    free = free[np.argsort(x[free], kind="stable")]
+    inside = [gc.SurfacePoint.face(int(free[i]), (0.2, 0.3, 0.5)) for i in sources]
+    field = gc.exact_distance(mesh, inside, barriers=walls)
+    cells = field.cells()
+    assert (cells.cell_of[np.isin(cells.cut.face_of, walls)] == -1).all()
+    faces = np.flatnonzero(~np.isin(cells.cut.face_of, walls))
+    middles = cells.cut.to_old([gc.SurfacePoint.face(int(f), (1 / 3,) * 3) for f in faces])
+    assert cells.cell_of[faces].tolist() == [field.nearest_source_at(each) for each in middles]
+    reached = np.isfinite(field.distances[mesh.faces[free]]).all(axis=1)
+    assert cells.areas.sum() == pytest.approx(mesh.face_areas[free[reached]].sum(), rel=1e-12)
+
+
+def test_a_source_that_is_walled_in_has_no_cell():
+    corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]]
+    book = gc.TriangleMesh(corners, [[0, 1, 2], [0, 1, 3], [0, 1, 4]])
+    with pytest.warns(gc.errors.BlockedSource):
+        cells = gc.exact_distance(book, [4, 2], barriers=[2]).cells()
+    np.testing.assert_allclose(cells.areas, [0.0, 1.0], rtol=1e-15)
+    assert cells.cell_of.tolist() == [1, 1, -1]
+    assert cells.centroids[0] is None
+
+
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_they_are_whole_on_any_surface(case):
     mesh = mesh_of(case)

@@ -250,6 +250,19 @@ def test_a_point_on_an_edge_of_three_faces_has_no_plane():
         gc.log_map(book, gc.SurfacePoint.face(0, (0.2, 0.3, 0.5)), x_axis=normal)
 
 
+@pytest.mark.filterwarnings("ignore::geodesic_core.errors.BlockedSource")
+@pytest.mark.parametrize(("vertex", "barriers"), [(4, []), (0, [0])])
+def test_a_vertex_that_is_in_no_face_has_no_plane(vertex, barriers):
+    corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [9, 9, 9]]
+    mesh = gc.TriangleMesh(corners, [[0, 1, 2], [1, 3, 2]]).with_barriers(barriers)
+    told = f"vertex {vertex} has no tangent plane, as no face is around it"
+    for call in (gc.log_map, gc.relax_points, gc.mean_point):
+        with pytest.raises(NoTangentPlane, match=told):
+            call(mesh, [vertex] if call is not gc.log_map else vertex)
+    with pytest.raises(NoTangentPlane, match=told):
+        gc.trace(mesh, vertex, 0.0, 1.0)
+
+
 @pytest.mark.parametrize(("share", "is_refused"), [(0.5, False), (2.0, True)])
 def test_rounded_turn_is_the_most_that_a_flat_vertex_exceeds_a_turn_by(share, is_refused):
     low, high = 0.0, 0.1
