@@ -42,7 +42,8 @@ from geodesic_core.loops.straighten import straightened_curve
 from geodesic_core.matrices.matrix import Layout, find_matrix
 from geodesic_core.mesh.barriers import with_barriers
 from geodesic_core.mesh.canonical import each_of
-from geodesic_core.mesh.surface_curve import Sources, SurfaceCurve, length_of
+from geodesic_core.mesh.frames import planes_at
+from geodesic_core.mesh.surface_curve import Sources, SurfaceCurve, length_of, locations_of
 from geodesic_core.mesh.surface_point import Curve, Point, Points, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.sampling.farthest_points import FarthestPoints, spread_points
@@ -728,9 +729,11 @@ def trace(
     surface, control = _surface_of(mesh, barriers, control)
     given = list(control.watched(each_of(start, "start")))
     starts = [surface.point(point, f"start {i}") for i, point in enumerate(control.watched(given))]
-    angles = directions_from(surface, starts, direction)
+    located = locations_of(surface, starts)
+    frames = planes_at(surface, located)
+    angles = directions_from(surface, located, frames, direction)
     lengths = as_lengths(length, len(starts))
-    lines = lines_from(surface, starts, angles, lengths, at_vertices == "stop", control)
+    lines = lines_from(surface, located, frames, angles, lengths, at_vertices == "stop", control)
     return lines if isinstance(start, Iterable) else lines[0]
 
 

@@ -13,7 +13,9 @@ from geodesic_core.fields.sweeps import DirectedSweep
 from geodesic_core.kernels.front.directions import angles_at_sources
 from geodesic_core.kernels.front.relaxation import nearest_sources
 from geodesic_core.kernels.front.state import ENTRY_EDGE, PREDECESSOR
-from geodesic_core.mesh.frames import Frame, frame_at
+from geodesic_core.kernels.mesh.frames import Frame
+from geodesic_core.mesh.frames import planes_at
+from geodesic_core.mesh.surface_curve import locations_of
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
@@ -35,8 +37,8 @@ class Charts:
     """(N, 2) mesh units, in the tangent plane of the nearest source; NaN where unreachable"""
     straight: Floats
     """(N,) mesh units: how far the path from the source is straight, up to its first bend"""
-    frames: tuple[Frame, ...]
-    """Of the sources"""
+    frames: Frame
+    """Of the sources, as arrays (S,)"""
 
     def steps(self, masses: Floats, first: int = 0) -> Floats:
         """Return a step for each source toward the middle of what is nearest to it, (S, 2).
@@ -75,20 +77,24 @@ class Charts:
 
         At a boundary a vector that leads off the surface is projected to the side of it.
         """
-        ways = [_way(frame, *vector) for frame, vector in zip(self.frames, vectors, strict=True)]
-        angles, lengths = np.array(ways).T
-        lines = lines_from(self.mesh, self.sources, angles, lengths, False, control)
+        turns, lengths = _ways(self.frames, vectors)
+        angles = self.frames.kernel_angles(turns / self.frames.scale)
+        starts = locations_of(self.mesh, self.sources)
+        lines = lines_from(self.mesh, starts, self.frames, angles, lengths, False, control)
         return [line.locations[-1] for line in lines]
 
 
-def _way(frame: Frame, x: float, y: float) -> tuple[float, float]:
-    """Return the kernels' angle of a vector in the tangent plane, and the length of the way."""
-    turn, length = math.atan2(y, x) % (2.0 * math.pi), math.hypot(x, y)
-    last = frame.total_angle * frame.scale
-    if not frame.is_closed and turn > last:
-        side, off = min((last, turn - last), (0.0, 2.0 * math.pi - turn), key=lambda way: way[1])
-        turn, length = side, length * max(math.cos(off), 0.0)
-    return float(frame.kernel_angles(np.array(turn / frame.scale))), length
+def _ways(frames: Frame, vectors: Floats) -> tuple[Floats, Floats]:
+    """Return angles in the tangent planes, and lengths, of vectors or of what is left of them."""
+    x, y = vectors.T
+    turns, lengths = np.arctan2(y, x) % (2.0 * math.pi), np.hypot(x, y)
+    last = frames.total_angle * frames.scale
+    leaves = ~frames.is_closed & (turns > last)
+    is_nearer_last = turns - last < 2.0 * math.pi - turns
+    off = np.where(is_nearer_last, turns - last, 2.0 * math.pi - turns)
+    sides = np.where(is_nearer_last, last, 0.0)
+    shares = np.maximum(np.cos(off), 0.0)
+    return np.where(leaves, sides, turns), np.where(leaves, lengths * shares, lengths)
 
 
 def charts_of(question: Question, control: Control) -> Charts:
@@ -102,7 +108,7 @@ def charts_of(question: Question, control: Control) -> Charts:
         As the control says.
     """
     mesh, sources = question.mesh, tuple(line[0] for line in question.polylines)
-    frames = tuple(frame_at(mesh, source) for source in sources)
+    frames = planes_at(mesh, locations_of(mesh, sources))
     vertices = DirectedSweep(question).run(control).vertices
     angles, _ = angles_at_sources(mesh.topology, vertices, question.nodes.sites)
     ints, index = vertices.winner_ints, vertices.source_index
@@ -130,9 +136,8 @@ def _straight(distances: Floats, winner_ints: Ints) -> Floats:
         first = np.where(is_bend, earlier, first)
 
 
-def _planar(frames: tuple[Frame, ...], angles: Floats, nearest: Ints) -> Floats:
+def _planar(frames: Frame, angles: Floats, nearest: Ints) -> Floats:
     """Return the kernels' angles as angles in the tangent planes of the nearest sources."""
-    starts = np.array([frame.start for frame in frames])
-    factors = np.array([frame.sense * frame.scale for frame in frames])
-    planar: Floats = (angles - starts[nearest]) * factors[nearest]
+    factors = frames.sense * frames.scale
+    planar: Floats = (angles - frames.start[nearest]) * factors[nearest]
     return planar

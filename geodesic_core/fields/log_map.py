@@ -14,7 +14,9 @@ from geodesic_core.fields.question import Question
 from geodesic_core.fields.straight_lines import lines_from
 from geodesic_core.fields.sweeps import DirectedSweep
 from geodesic_core.kernels.front.directions import angles_at_sources
-from geodesic_core.mesh.frames import Frame, direction_of, frame_at
+from geodesic_core.kernels.mesh.frames import Frame
+from geodesic_core.mesh.frames import directions_of, frame_at, frames_at
+from geodesic_core.mesh.surface_curve import locations_of
 from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import ROUNDED_TURN
@@ -157,8 +159,9 @@ class LogMap:
             raise InvalidArgument("coordinates must be pairs of finite numbers, (N, 2)")
         turns = np.mod(np.arctan2(pairs[:, 1], pairs[:, 0]), 2.0 * math.pi) / self._scale
         angles = self._frame.kernel_angles(turns + self._axis)
-        starts, lengths = [self.source] * len(angles), np.hypot(*pairs.T)
-        lines = lines_from(self.mesh, starts, angles, lengths, False, Control())
+        starts = locations_of(self.mesh, [self.source] * len(angles))
+        frames, lengths = frames_at(self.mesh, starts), np.hypot(*pairs.T)
+        lines = lines_from(self.mesh, starts, frames, angles, lengths, False, Control())
         return [line.locations[-1] for line in lines]
 
     def _in_range(self, angles: Floats) -> Floats:
@@ -198,7 +201,10 @@ def log_map_of(question: Question, control: Control, x_axis: Any, *, rescale: bo
             f"the angles around {source} sum to {frame.total_angle:.6g}, more than a full turn: "
             "they do not fit into a plane without rescale=True"
         )
-    axis = 0.0 if x_axis is None else direction_of(mesh, source, as_vector("x_axis", x_axis))
+    axis = 0.0
+    if x_axis is not None:
+        at, vectors = locations_of(mesh, [source]), as_vector("x_axis", x_axis)[None]
+        axis = float(directions_of(mesh, at, frames_at(mesh, at), vectors)[0])
     if math.isnan(axis):
         raise NoDirection("x_axis has no direction on the surface: it is zero, or along the normal")
     distances, angles, bends = _swept(question, control)

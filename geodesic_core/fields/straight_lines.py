@@ -1,7 +1,5 @@
 """Straightest lines over the surface: from a point in a direction, for a length."""
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Literal
@@ -9,50 +7,40 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geodesic_core.arrays import Floats, Longs
+from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.control import Control
-from geodesic_core.errors import InvalidArgument, InvalidPoint, NoDirection, NoTangentPlane
+from geodesic_core.errors import InvalidArgument, NoDirection
 from geodesic_core.fields.path import EXACT, GeodesicPath
-from geodesic_core.kernels.mesh import locations
+from geodesic_core.kernels.mesh.frames import Frame
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
     COS_LEFT,
-    COS_RIGHT,
     HEAD,
     LENGTH,
     LENGTH_LEFT,
     SIN_LEFT,
-    SIN_RIGHT,
     TAIL,
-    point_in_frame,
 )
-from geodesic_core.kernels.mesh.locations import Locations
+from geodesic_core.kernels.mesh.locations import Locations, empty_locations, locate_nodes
 from geodesic_core.kernels.paths.straight_lines import (
-    ANGLE,
     AT_BOUNDARY,
     AT_LENGTH,
     AT_NON_MANIFOLD,
     AT_VERTEX,
-    DX,
-    DY,
-    FLOATS,
     HALF_EDGE,
-    INTS,
     LEFT,
+    PASSED,
     STOP,
     VERTEX,
     Trail,
     X,
     Y,
-    enter_face,
-    load_line,
-    store_line,
-    through_vertex,
+    begin_lines,
+    directions_of_ends,
     trace_lines,
 )
-from geodesic_core.mesh.curve import weights_by_face
-from geodesic_core.mesh.frames import axis_of, base_of, direction_of, frame_at
-from geodesic_core.mesh.surface_curve import in_space, point_of, rows_of
+from geodesic_core.mesh.frames import directions_of, frames_at
+from geodesic_core.mesh.surface_curve import fill, in_space, locations_of, point_of, rows_of
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import WEIGHT
@@ -69,7 +57,7 @@ _WORDS: dict[int, Stopped] = {
 _TRAIL = 1 << 16
 """Points that a call of the kernel traces, at most: some milliseconds"""
 
-_TRAIL_BYTES = 20 * _TRAIL
+_TRAIL_BYTES = 24 * _TRAIL
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -96,14 +84,12 @@ class StraightLine(GeodesicPath):
 
 
 def directions_from(
-    mesh: TriangleMesh, starts: Sequence[SurfacePoint], directions: ArrayLike
+    mesh: TriangleMesh, starts: Locations, frames: Frame, directions: ArrayLike
 ) -> Floats:
     """Return the kernels' angles of directions at canonical points, angles or vectors.
 
     Raises
     ------
-    NoTangentPlane
-        A start has none.
     NoDirection
         A vector has none on the surface.
     InvalidArgument
@@ -113,28 +99,23 @@ def directions_from(
         given = np.asarray(directions, np.float64)
     except (TypeError, ValueError):
         given = np.array(np.nan)
-    count = len(starts)
+    count = len(starts.faces)
     if given.shape not in ((), (count,), (3,), (count, 3)) or not np.isfinite(given).all():
         raise InvalidArgument(
             f"direction must be a finite angle or a vector of three, or {count} of them"
         )
     are_vectors = given.shape == (count, 3) or (given.shape == (3,) and count != 3)
-    given = np.broadcast_to(given, (count, 3) if are_vectors else (count,))
-    angles = np.empty(count)
-    for i, start in enumerate(starts):
-        try:
-            frame = frame_at(mesh, start)
-        except NoTangentPlane as error:
-            raise NoTangentPlane(str(error), i) from None
-        angle = direction_of(mesh, start, given[i]) if are_vectors else given[i]
-        if math.isnan(angle):
-            raise NoDirection(
-                f"direction {i} is {given[i].tolist()}, which is zero, or along the normal at "
-                f"{start}: it has no direction on the surface",
-                i,
-            )
-        angles[i] = frame.kernel_angles(np.array(angle))
-    return angles
+    if not are_vectors:
+        return frames.kernel_angles(np.broadcast_to(given, (count,)))
+    vectors = np.broadcast_to(given, (count, 3))
+    angles = directions_of(mesh, starts, frames, vectors)
+    for i in np.flatnonzero(np.isnan(angles)).tolist():
+        raise NoDirection(
+            f"direction {i} is {vectors[i].tolist()}, which is zero, or along the normal at "
+            f"{point_of(starts, i)}: it has no direction on the surface",
+            i,
+        )
+    return frames.kernel_angles(angles)
 
 
 def as_lengths(length: ArrayLike, count: int) -> Floats:
@@ -156,7 +137,8 @@ def as_lengths(length: ArrayLike, count: int) -> Floats:
 
 def lines_from(
     mesh: TriangleMesh,
-    starts: Sequence[SurfacePoint],
+    starts: Locations,
+    frames: Frame,
     kernel_angles: Floats,
     lengths: Floats,
     stops: bool,
@@ -171,44 +153,11 @@ def lines_from(
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As the control says.
     """
-    ints, floats = np.zeros((len(starts), INTS), np.int64), np.zeros((len(starts), FLOATS))
-    for i, start in enumerate(control.watched(starts)):
-        _start(mesh, start, float(kernel_angles[i]), float(lengths[i]), ints, floats, i)
+    ints, floats = begin_lines(
+        mesh.topology, mesh.faces, mesh.inner_face, starts, frames, kernel_angles, lengths
+    )
     trail = _traced(mesh, ints, floats, stops, control)
     return _as_paths(mesh, starts, lengths, ints, floats, trail)
-
-
-def _start(
-    mesh: TriangleMesh,
-    start: SurfacePoint,
-    angle: float,
-    length: float,
-    ints: Longs,
-    floats: Floats,
-    i: int,
-) -> None:
-    """Write a line that begins at a canonical point to row i. Modifies both arrays."""
-    geometry = mesh.topology.geometry
-    ints[i, [VERTEX, HALF_EDGE]], floats[i, ANGLE], floats[i, LEFT] = -1, angle, length
-    if start.vertex_index is not None:
-        ints[i, VERTEX] = v = mesh.topology.inner_vertex[start.vertex_index]
-        faces, total = {}, float(mesh.topology.total_angle[v])
-    else:
-        faces = weights_by_face(mesh, start)
-        total = len(faces) * math.pi if 0.0 in start.barycentric else math.inf
-    if not -_OFF <= angle <= total + _OFF and not frame_at(mesh, start).is_closed:
-        ints[i, STOP] = AT_BOUNDARY
-    elif faces:
-        number = 0 if len(faces) == 1 else min(max(int(angle // math.pi), 0), len(faces) - 1)
-        face, weights = list(faces.items())[number]
-        h = base_of(face, weights)
-        x, y = point_in_frame(geometry, h, np.array(weights))
-        line = enter_face(geometry, h, x, y, angle - number * math.pi, length)
-        store_line(ints, floats, i, line)
-
-
-_OFF = 1e-12
-"""Radians by which a direction may miss the wedge of the surface at a boundary"""
 
 
 def _traced(
@@ -221,6 +170,7 @@ def _traced(
         control.check_memory(size)
         control.checkpoint(done / max(len(ints), 1))
         trail = Trail(
+            np.empty(_TRAIL, np.int32),
             np.empty(_TRAIL, np.int32),
             np.empty(_TRAIL, np.int32),
             np.empty(_TRAIL),
@@ -237,7 +187,7 @@ def _traced(
 
 def _as_paths(
     mesh: TriangleMesh,
-    starts: Sequence[SurfacePoint],
+    starts: Locations,
     lengths: Floats,
     ints: Longs,
     floats: Floats,
@@ -245,78 +195,55 @@ def _as_paths(
 ) -> list[StraightLine]:
     """Return lines that have ended as paths: a start each, its part of the trail, and an end."""
     is_inside = ints[:, STOP] == AT_LENGTH  # ends in a face, and not where the trail does
-    inside = np.flatnonzero(is_inside)
-    ends = _ends_in_faces(mesh, ints[inside, HALF_EDGE], floats[inside, X], floats[inside, Y])
-    passed = np.bincount(trail.lines, minlength=len(starts))
-    first = np.concatenate([[0], np.cumsum(1 + passed + is_inside)])
-    all_rows = _empty_locations(int(first[-1]))
-    is_passed = np.ones(len(all_rows.faces), np.bool_)
-    is_passed[first[:-1]] = is_passed[first[1:][inside] - 1] = False
-    _fill(all_rows, is_passed, _passed(mesh, trail))
-    _fill(all_rows, first[:-1], _rows_of(mesh, starts))
-    _fill(all_rows, first[1:][inside] - 1, ends)
-    on_edges = first[1:][(ints[:, STOP] != AT_LENGTH) & (ints[:, VERTEX] < 0)] - 1
-    canonical = [mesh.point(point_of(all_rows, row)) for row in on_edges]
-    _fill(all_rows, on_edges, _rows_of(mesh, canonical))
-    faces = np.empty(len(is_passed), np.int32)
-    faces[is_passed] = mesh.topology.outer_face[trail.faces]
-    faces[first[1:][inside] - 1] = mesh.topology.outer_face[ints[inside, HALF_EDGE] // 3]
-    in_its_space, directions = in_space(mesh, all_rows), np.empty(len(starts))
-    directions[inside] = _directions_in_faces(mesh, ints[inside, HALF_EDGE], floats[inside])
-    lines = []
-    for i, (lo, hi) in enumerate(pairwise(first.tolist())):
-        end = point_of(all_rows, hi - 1)
-        stop = int(ints[i, STOP])
-        if stop != AT_LENGTH or 0.0 in end.barycentric:
-            directions[i] = _direction_on_edge(mesh, end, ints[i], floats[i])
-        lines.append(
-            StraightLine(
-                mesh=mesh,
-                faces=faces[lo + 1 : hi],
-                closed=False,
-                length=float(lengths[i] - (0.0 if stop == AT_LENGTH else floats[i, LEFT])),
-                located=rows_of(in_its_space, slice(lo, hi)),
-                error_bound=EXACT,
-                steps=None,
-                stopped=_word(mesh, stop, end),
-                end_direction=float(directions[i]),
-            )
+    first = np.concatenate([[0], np.cumsum(1 + ints[:, PASSED] + is_inside)])
+    located, faces = _located(mesh, trail, first)
+    fill(located, first[:-1], starts)
+    last, h = first[1:] - 1, ints[is_inside, HALF_EDGE]
+    ends = _ends_in_faces(mesh, h, floats[is_inside, X], floats[is_inside, Y])
+    fill(located, last[is_inside], ends)
+    faces[last[is_inside]] = mesh.topology.outer_face[h // 3]
+    on_edges = last[~is_inside & (ints[:, VERTEX] < 0)]
+    canonical = [mesh.point(point_of(located, row)) for row in on_edges]
+    fill(located, on_edges, locations_of(mesh, canonical))
+    ends = rows_of(located, last)
+    directions, stopped = _end_directions(mesh, ends, ints, floats), _words(mesh, ends, ints)
+    done = np.where(is_inside, lengths, lengths - floats[:, LEFT])
+    in_its_space = in_space(mesh, located)
+    return [
+        StraightLine(
+            mesh=mesh,
+            faces=faces[lo + 1 : hi],
+            closed=False,
+            length=length,
+            located=rows_of(in_its_space, slice(lo, hi)),
+            error_bound=EXACT,
+            steps=None,
+            stopped=word,
+            end_direction=direction,
         )
-    return lines
+        for (lo, hi), length, word, direction in zip(
+            pairwise(first.tolist()), done.tolist(), stopped, directions.tolist(), strict=True
+        )
+    ]
 
 
-def _empty_locations(count: int) -> Locations:
-    return Locations(
-        np.empty(count, np.int32),
-        np.empty((count, 3)),
-        np.empty(count, np.int64),
-        np.empty((count, 3)),
-    )
+def _located(mesh: TriangleMesh, trail: Trail, first: Longs) -> tuple[Locations, Ints]:
+    """Return the points of lines that begin at these rows, and the faces before them.
+
+    Starts and ends in faces, which are not on the trail, are left open.
+    """
+    count, rows = int(first[-1]), first[trail.lines] + 1 + trail.numbers
+    nodes = np.full(count, _NOWHERE, np.int32)
+    parameters, faces = np.zeros(count), np.empty(count, np.int32)
+    nodes[rows], parameters[rows] = trail.nodes, trail.parameters
+    faces[rows] = mesh.topology.outer_face[trail.faces]
+    located = empty_locations(count)
+    locate_nodes(mesh.embedding, mesh.faces, nodes, parameters, located)
+    return located, faces
 
 
-def _fill(all_rows: Locations, rows: Any, located: Locations) -> None:
-    columns: tuple[Any, ...] = all_rows
-    for column, part in zip(columns, located, strict=True):
-        column[rows] = part
-
-
-def _passed(mesh: TriangleMesh, trail: Trail) -> Locations:
-    """Return the points of a trail."""
-    located = _empty_locations(len(trail.nodes))
-    locations.locate_nodes(mesh.embedding, mesh.faces, trail.nodes, trail.parameters, located)
-    return located
-
-
-def _rows_of(mesh: TriangleMesh, points: Sequence[SurfacePoint]) -> Locations:
-    """Return canonical points as locations."""
-    places = {point: mesh.position_from_origin(point) for point in set(points)}
-    vertices = (-1 if point.vertex_index is None else point.vertex_index for point in points)
-    return Locations(
-        np.array([point.face_index for point in points], np.int32),
-        np.array([point.barycentric for point in points]).reshape(-1, 3),
-        np.fromiter(vertices, np.int64, len(points)),
-        np.array([places[point] for point in points]).reshape(-1, 3),
-    )
+_NOWHERE = np.iinfo(np.int32).min
+"""A node that `locate_nodes` skips, as it does sites"""
 
 
 def _ends_in_faces(mesh: TriangleMesh, h: Longs, x: Floats, y: Floats) -> Locations:
@@ -340,61 +267,27 @@ def _ends_in_faces(mesh: TriangleMesh, h: Longs, x: Floats, y: Floats) -> Locati
     points = [
         mesh.point(SurfacePoint.face(int(faces[i]), tuple(weights[i].tolist()))) for i in beside
     ]
-    _fill(located, beside, _rows_of(mesh, points))
+    fill(located, beside, locations_of(mesh, points))
     return located
 
 
-def _word(mesh: TriangleMesh, stop: int, end: SurfacePoint) -> Stopped:
-    """Return the word for why a line stops; an edge or a vertex of a blocked face is a barrier."""
-    if stop == AT_BOUNDARY and len(mesh.barriers):
-        corners = mesh.topology.inner_vertex[mesh.faces[end.face_index]]
-        at = corners[np.array(end.barycentric) > 0.0]
+def _words(mesh: TriangleMesh, ends: Locations, ints: Longs) -> list[Stopped]:
+    """Return why lines stop; an edge or a vertex of a blocked face is a barrier."""
+    words = [_WORDS[stop] for stop in ints[:, STOP].tolist()]
+    if len(mesh.barriers):
         blocked = mesh.topology.inner_vertex[mesh.faces[mesh.barriers]]
-        if (blocked[:, :, None] == at).any(axis=1).all(axis=1).any():
-            return "barrier"
-    return _WORDS[stop]
+        for i in np.flatnonzero(ints[:, STOP] == AT_BOUNDARY).tolist():
+            corners = mesh.topology.inner_vertex[mesh.faces[ends.faces[i]]]
+            at = corners[ends.weights[i] > 0.0]
+            if (blocked[:, :, None] == at).any(axis=1).all(axis=1).any():
+                words[i] = "barrier"
+    return words
 
 
-def _directions_in_faces(mesh: TriangleMesh, h: Longs, floats: Floats) -> Floats:
-    """Return the directions of lines that end inside the faces of half-edges, in their frames.
+def _end_directions(mesh: TriangleMesh, ends: Locations, ints: Longs, floats: Floats) -> Floats:
+    """Return the directions of lines at their ends, in their frames; NaN where there is no plane.
 
-    The same as `frame_at` would give, for many at once.
+    Radians.
     """
-    topology, base = mesh.topology, h - h % 3
-    geometry = topology.geometry[base]
-    axes = np.stack(  # of the three half-edges, in the frame of the first
-        [
-            np.zeros(len(h)),
-            math.pi - np.arctan2(geometry[:, SIN_RIGHT], geometry[:, COS_RIGHT]),
-            math.pi + np.arctan2(geometry[:, SIN_LEFT], geometry[:, COS_LEFT]),
-        ],
-        axis=1,
-    )
-    nodes = topology.inner_vertex[mesh.faces[topology.outer_face[h // 3]]]
-    tails = topology.links[base[:, None] + np.arange(3), TAIL]
-    first, second = (np.argmax(tails == nodes[:, [k]], axis=1) for k in (0, 1))
-    is_same_way, row = second == (first + 1) % 3, np.arange(len(h))
-    axis = np.where(is_same_way, axes[row, first], axes[row, second] + math.pi)
-    turn = np.arctan2(floats[:, DY], floats[:, DX]) + axes[row, h % 3] - axis
-    directions: Floats = np.mod(np.where(is_same_way, turn, -turn), 2.0 * math.pi)
-    return directions
-
-
-def _direction_on_edge(mesh: TriangleMesh, end: SurfacePoint, ints: Longs, floats: Floats) -> float:
-    """Return the same of a line that ends on an edge or at a vertex; NaN if it has no plane."""
-    try:
-        frame, h = frame_at(mesh, end), int(ints[HALF_EDGE])
-    except InvalidPoint:
-        return math.nan
-    if ints[VERTEX] >= 0 or h < 0:
-        angle = float(floats[ANGLE])
-    elif end.vertex_index is not None:  # as long as asked for: it was not sent on from there
-        line = load_line(ints[None], floats[None], 0)
-        v = int(mesh.topology.inner_vertex[end.vertex_index])
-        angle = through_vertex(mesh.topology, line, v, True).angle
-    else:
-        faces = weights_by_face(mesh, end)
-        base = base_of(h // 3, faces[h // 3])
-        angle = list(faces).index(h // 3) * math.pi - axis_of(mesh, base, h)
-        angle += math.atan2(floats[DY], floats[DX])
-    return float(frame.angles(np.array(angle)))
+    angles = directions_of_ends(mesh.topology, mesh.faces, mesh.inner_face, ends, ints, floats)
+    return frames_at(mesh, ends).angles(angles)

@@ -11,10 +11,11 @@ from geodesic_core.fields.sweeps import DirectedSweep
 from geodesic_core.kernels.front.directions import angles_at_sources, angles_of_legs
 from geodesic_core.kernels.front.state import PREDECESSOR
 from geodesic_core.kernels.mesh.half_edges import FANS
-from geodesic_core.mesh.frames import frame_at
+from geodesic_core.kernels.mesh.locations import empty_locations, locate_nodes
+from geodesic_core.mesh.frames import frame_at, frames_at
 from geodesic_core.mesh.transport import is_straight
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.mesh.vertex_frames import first_corners, is_open, scales_of, vertex_frames
+from geodesic_core.mesh.vertex_frames import is_open, scales_of
 
 
 def transported(question: Question, angle: float, control: Control) -> Floats:
@@ -60,13 +61,10 @@ def _by_bends(bends: Ints, is_reached: Flags) -> list[Longs]:
 
 def _in_frames(mesh: TriangleMesh, turns: Floats, scales: Floats) -> Floats:
     """Return angles (V,) in the frames of vertices from turns of inner vertices."""
-    topology = mesh.topology
-    used = np.flatnonzero(mesh.inner_face >= 0)
-    corners = first_corners(topology.inner_vertex[mesh.faces[used]], len(turns))
-    nodes = np.flatnonzero(corners >= 0)
-    lowest = used[corners[nodes] // 3]
-    starts, senses = vertex_frames(topology, mesh.faces, mesh.inner_face, nodes, lowest)
-    angles = np.full(len(turns), np.nan)
-    away = senses * (turns[nodes] - scales[nodes] * starts)
-    angles[nodes] = np.mod(away, 2.0 * math.pi) / scales[nodes]
-    return angles[topology.inner_vertex]
+    nodes = -1 - np.arange(len(turns), dtype=np.int32)
+    located = empty_locations(len(nodes))
+    locate_nodes(mesh.embedding, mesh.faces, nodes, np.zeros(len(nodes)), located)
+    frames = frames_at(mesh, located)
+    away = frames.sense * (turns - scales * frames.start)
+    angles: Floats = np.mod(away, 2.0 * math.pi) / scales
+    return angles[mesh.topology.inner_vertex]

@@ -69,7 +69,7 @@ def on_edge(topology: Topology, faces: Ints, start: int, end: int, t: float) -> 
 _NEXT, _LAST = [1, 2, 0], [2, 0, 1]
 
 
-def _cross(a: Floats, b: Floats) -> Floats:
+def cross(a: Floats, b: Floats) -> Floats:
     """Return the cross products of vectors (…, 3): numpy's own takes ten times as long for few."""
     product: Floats = a[..., _NEXT] * b[..., _LAST] - a[..., _LAST] * b[..., _NEXT]
     return product
@@ -83,11 +83,11 @@ def weights_of(point: Floats, corners: Floats, snap: float) -> list[float]:
     """
     edges = corners[_NEXT] - corners  # from each corner to the next
     away = point - corners
-    normal = _cross(edges[0], edges[1])
+    normal = cross(edges[0], edges[1])
     area = float(np.linalg.norm(normal))  # twice
     lengths = np.linalg.norm(edges, axis=1)
     # Height times length, by edge.
-    parts = _cross(edges, away) @ normal / area if area > 0.0 else np.zeros(3)
+    parts = cross(edges, away) @ normal / area if area > 0.0 else np.zeros(3)
     is_near = parts <= snap * lengths
     if is_near.any():
         i = int(np.argmax(np.where(is_near, lengths, -1.0)))

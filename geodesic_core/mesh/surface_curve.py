@@ -395,11 +395,33 @@ def rows_of(located: Locations, rows: Any) -> Locations:
     return Locations(*(array[rows] for array in located))
 
 
+def fill(located: Locations, rows: Any, points: Locations) -> None:
+    """Write points to some rows of locations."""
+    columns: tuple[Any, ...] = located
+    for column, part in zip(columns, points, strict=True):
+        column[rows] = part
+
+
 def point_of(located: Locations, i: int) -> SurfacePoint:
     """Return a point of some locations."""
     u, v, w = located.weights[i].tolist()
     vertex = int(located.vertices[i])
     return SurfacePoint(int(located.faces[i]), (u, v, w), vertex if vertex >= 0 else None)
+
+
+def locations_of(mesh: "TriangleMesh", points: Sequence[SurfacePoint]) -> Locations:
+    """Return canonical points as locations, measured from the mesh's origin."""
+    faces = np.array([point.face_index for point in points], np.int32)
+    weights = np.array([point.barycentric for point in points], np.float64).reshape(-1, 3)
+    vertices = np.array(
+        [-1 if point.vertex_index is None else point.vertex_index for point in points],
+        np.int64,
+    )
+    # Not a matrix product, whose last bit depends on where its arrays lie in memory.
+    places = (weights[:, :, None] * (mesh.vertices[mesh.faces[faces]] - mesh.origin)).sum(axis=1)
+    is_vertex = vertices >= 0
+    places[is_vertex] = mesh.vertices[vertices[is_vertex]] - mesh.origin
+    return Locations(faces, weights, vertices, places)
 
 
 def draw_over(

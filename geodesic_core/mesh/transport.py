@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from geodesic_core.kernels.mesh.frames import axis_of
 from geodesic_core.kernels.mesh.half_edges import APEX_ANGLE, TAIL, following, point_in_frame
 from geodesic_core.mesh.curve import weights_by_face
-from geodesic_core.mesh.frames import axis_of, base_of, frame_at
-from geodesic_core.mesh.surface_point import SurfacePoint
+from geodesic_core.mesh.frames import frame_at
+from geodesic_core.mesh.surface_point import SurfacePoint, Weights
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import STRAIGHT_THROUGH
 
@@ -107,7 +108,7 @@ def _from_point(
     faces = weights_by_face(mesh, point)
     number = min(max(int(turn // math.pi), 0), len(faces) - 1)
     into, weights = list(faces.items())[number]
-    vector = turn - number * math.pi + axis_of(mesh, base_of(into, weights), 3 * into)
+    vector = turn - number * math.pi + _axis_of(mesh, _base_of(into, weights), 3 * into)
     return _over_edge(mesh, point, vector, into, face)
 
 
@@ -124,7 +125,7 @@ def _to_point(
     faces = weights_by_face(mesh, point)
     for number, (into, weights) in enumerate(faces.items()):
         turned = _over_edge(mesh, point, vector, face, into)
-        turn = (turned - axis_of(mesh, base_of(into, weights), 3 * into)) % (2.0 * math.pi)
+        turn = (turned - _axis_of(mesh, _base_of(into, weights), 3 * into)) % (2.0 * math.pi)
         if turn <= math.pi:
             return turn + number * math.pi
     return turn
@@ -135,7 +136,7 @@ def _angle_at(mesh: TriangleMesh, vertex: SurfacePoint, face: int, way: float) -
     topology = mesh.topology
     node = topology.inner_vertex[vertex.vertex_index]
     (h,) = (h for h in range(3 * face, 3 * face + 3) if topology.links[h, TAIL] == node)
-    inward = (way - axis_of(mesh, h, 3 * face) + 0.5 * math.pi) % (2.0 * math.pi) - 0.5 * math.pi
+    inward = (way - _axis_of(mesh, h, 3 * face) + 0.5 * math.pi) % (2.0 * math.pi) - 0.5 * math.pi
     return float(topology.geometry[following(h), APEX_ANGLE]) + inward
 
 
@@ -146,7 +147,20 @@ def _over_edge(
     if face == beyond:
         return vector
     faces = weights_by_face(mesh, point)
-    h, g = (base_of(each, faces[each]) for each in (face, beyond))
-    turn = vector - axis_of(mesh, h, 3 * face)
+    h, g = (_base_of(each, faces[each]) for each in (face, beyond))
+    turn = vector - _axis_of(mesh, h, 3 * face)
     tails = mesh.topology.links[[h, g], TAIL]
-    return axis_of(mesh, g, 3 * beyond) + (-turn if tails[0] == tails[1] else turn + math.pi)
+    return _axis_of(mesh, g, 3 * beyond) + (-turn if tails[0] == tails[1] else turn + math.pi)
+
+
+def _base_of(face: int, weights: Weights) -> int:
+    """Return the half-edge of an inner face that a point with these weights lies on, or its first.
+
+    The kernels measure angles at the point from there.
+    """
+    corner = weights.index(0.0) if 0.0 in weights else 2
+    return 3 * face + (corner + 1) % 3
+
+
+def _axis_of(mesh: TriangleMesh, h: int, base: int) -> float:
+    return float(axis_of(mesh.topology.geometry, h, base))

@@ -108,10 +108,10 @@ def _lower(
     control: Control,
 ) -> Charts | None:
     """Return a point of less variance: on the way to the target, or beside it; None if none is."""
-    best, frame = _variance(mean, weights), mean.frames[0]
+    best, frames = _variance(mean, weights), mean.frames
     reach = math.hypot(*target)
-    last = frame.total_angle * frame.scale
-    around = np.linspace(0.0, last, _DIRECTIONS, endpoint=not frame.is_closed)
+    last = (frames.total_angle * frames.scale)[0]
+    around = np.linspace(0.0, last, _DIRECTIONS, endpoint=not frames.is_closed[0])
     beside = np.stack([np.cos(around), np.sin(around)], axis=1)
     while reach > smallest:
         for direction in (target / math.hypot(*target), *beside):

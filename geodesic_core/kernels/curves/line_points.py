@@ -7,7 +7,7 @@ import numpy as np
 from geodesic_core.arrays import Ints, Longs
 from geodesic_core.kernels.curves.chains import Lines
 from geodesic_core.kernels.jit import borrowed, kernel
-from geodesic_core.kernels.mesh.locations import Locations, locate_in_face
+from geodesic_core.kernels.mesh.locations import Locations, empty_locations, locate_in_face
 
 
 @kernel
@@ -18,9 +18,7 @@ def locate_lines(embedding: Any, faces: Ints, lines: Lines) -> tuple[Locations, 
     them lines that are nothing else.
     """
     embedding, size = borrowed(embedding), len(lines.faces)
-    located = Locations(
-        np.empty(size, np.int32), np.empty((size, 3)), np.empty(size, np.int64), np.empty((size, 3))
-    )
+    located = empty_locations(size)
     segment_faces, first = np.empty(size, np.int32), np.zeros(len(lines.first), np.int64)
     count = 0
     for line in range(len(lines.closed)):

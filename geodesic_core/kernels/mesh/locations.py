@@ -24,6 +24,17 @@ class Locations(NamedTuple):
 
 
 @kernel
+def empty_locations(count: int) -> Locations:
+    """Return room for so many points."""
+    return Locations(
+        np.empty(count, np.int32),
+        np.empty((count, 3)),
+        np.empty(count, np.int64),
+        np.empty((count, 3)),
+    )
+
+
+@kernel
 def locate_nodes(
     embedding: Embedding, faces: Ints, nodes: Ints, parameters: Floats, locations: Locations
 ) -> None:
@@ -87,12 +98,7 @@ def locate_points(
 ) -> Locations:
     """Return the points of inner faces (N,) that have weights (N, 3) at inner corners."""
     count = len(inner_faces)
-    located = Locations(
-        np.empty(count, np.int32),
-        np.empty((count, 3)),
-        np.empty(count, np.int64),
-        np.empty((count, 3)),
-    )
+    located = empty_locations(count)
     for i in range(count):
         locate_in_face(embedding, faces, inner_faces[i], weights, i, located, i)
     return located
