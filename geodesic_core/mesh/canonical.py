@@ -47,6 +47,8 @@ def in_face(
     if abs(total - 1.0) <= ROUNDED_SUM:
         total = 1.0
     u, v, w = (weight / total for weight in cleaned)
+    if 0.0 not in cleaned and inner_face[face] >= 0:
+        return SurfacePoint(face, (u, v, w))
     share: dict[int, float] = {}
     for node, part in zip(topology.inner_vertex[faces[face]].tolist(), (u, v, w), strict=True):
         if part > 0.0:

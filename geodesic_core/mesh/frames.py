@@ -80,7 +80,8 @@ def directions_of(mesh: TriangleMesh, located: Locations, frames: Frame, vectors
         mesh, rows_of(located, beside), Frame(*(column[beside] for column in frames))
     )
     x, y = np.vecdot(x_axes, vectors), np.vecdot(y_axes, vectors)
-    turns = np.mod(np.arctan2(y, x), 2.0 * math.pi)
+    # Not numpy's arctan2, whose last bit depends on the processor
+    turns = np.mod(list(map(math.atan2, y.tolist(), x.tolist())), 2.0 * math.pi)
     is_lost = np.hypot(x, y) <= NO_DIRECTION * _lengths(vectors)
     directions: Floats = np.where(is_lost, np.nan, turns / scales)
     return directions

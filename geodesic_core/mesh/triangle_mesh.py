@@ -786,7 +786,7 @@ class TriangleMesh:
         return canonical.at_vertex(self.topology, self.faces, int(index))
 
     def _point_in_face(self, face: int, weights: Sequence[float], name: str) -> SurfacePoint:
-        if not of_three_vertices(self.faces[[face]])[0]:
+        if self.inner_face[face] < 0 and not of_three_vertices(self.faces[[face]])[0]:
             raise InvalidPoint(
                 f"the {name} is in face {face}, which repeats a vertex and is not part of the "
                 "surface"

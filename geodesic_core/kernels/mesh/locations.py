@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints, Longs
-from geodesic_core.kernels.jit import inlined, kernel
+from geodesic_core.kernels.jit import borrowed, inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL, Embedding, Topology, next_around
 from geodesic_core.tolerances import WEIGHT
 
@@ -42,7 +42,8 @@ def locate_nodes(
 
     ``faces`` are the caller's. Sites are skipped, but for their weights, which become 0.
     """
-    topology = embedding.topology
+    embedding, locations = borrowed(embedding), borrowed(locations)
+    faces, topology = borrowed(faces), embedding.topology
     for i in range(len(nodes)):
         v, t = -1 - nodes[i], parameters[i]
         if v < 0 and (t == 0.0 or 1.0 - t == 0.0 or 1.0 - t == 1.0):

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints, Longs
-from geodesic_core.kernels.jit import inlined, kernel, pointer, prefetch
+from geodesic_core.kernels.jit import borrowed, inlined, kernel, pointer, prefetch
 from geodesic_core.kernels.mesh.frames import Frame, axis_of, half_edge_at
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
@@ -129,6 +129,8 @@ def trace_lines(
     ends, HALF_EDGE, X and Y say where, and DX and DY in which direction; at a vertex, VERTEX and
     ANGLE do.
     """
+    topology, trail = borrowed(topology), borrowed(trail)
+    ints, floats = borrowed(ints), borrowed(floats)
     count, room, end = 0, len(trail.nodes), len(ints)
     turns = np.full(TOGETHER, end)
     row = first - 1
@@ -275,10 +277,10 @@ def over_edge(topology: Topology, line: Line, m: int, parameter: float) -> Line:
     if across < 0:
         return stopped(line, AT_BOUNDARY if across == NO_FACE else AT_NON_MANIFOLD)
     if m == following(h):
-        cosine, sine = geometry[h, COS_RIGHT], geometry[h, SIN_RIGHT]
+        cosine, sine, length = geometry[h, COS_RIGHT], geometry[h, SIN_RIGHT], LENGTH_RIGHT
     else:
-        cosine, sine = geometry[h, COS_LEFT], -geometry[h, SIN_LEFT]
-    x = (1.0 - parameter) * geometry[m, LENGTH]
+        cosine, sine, length = geometry[h, COS_LEFT], -geometry[h, SIN_LEFT], LENGTH_LEFT
+    x = (1.0 - parameter) * geometry[h, length]  # and not another cache line, of m
     dx, dy = dx * cosine - dy * sine, dx * sine + dy * cosine
     return on_half_edge(across, x, dx, dy, line.left)
 
