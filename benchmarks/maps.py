@@ -48,7 +48,6 @@ AGREEMENT = 1e-9
 PAIRS = 3
 """Pairs of a sweep and a log map, for each of the runs"""
 
-timed = partial(timing.timed, clock=time.process_time)
 by_turns = partial(timing.by_turns, clock=time.process_time)
 
 GEOMETRY_CENTRAL = Path(__file__).parent / "peers" / "geometry_central" / "build" / "log_map"
@@ -77,10 +76,11 @@ def _costs(inputs: Inputs, runs: int) -> Section:
     rows = []
     for name, vertices, faces, most in surfaces:
         mesh = gc.TriangleMesh(vertices, faces)
-        sweeps_s, maps_s, log_map = _paired(
+        sweeps_s, maps_s, log_map = timing.paired(
             partial(gc.exact_distance, mesh, SOURCE),
             partial(gc.log_map, mesh, SOURCE),
             PAIRS * runs,
+            time.process_time,
         )
         straight = log_map.bends[log_map.bends >= 0] == 0
         rows.append(
@@ -89,7 +89,7 @@ def _costs(inputs: Inputs, runs: int) -> Section:
                 f"{len(faces):,}",
                 f"{1e3 * median(sweeps_s):.1f}",
                 f"{1e3 * median(maps_s):.1f}",
-                rated(_ratio(maps_s, sweeps_s), most, at_least=False, digits=3),
+                rated(timing.ratio(maps_s, sweeps_s), most, at_least=False, digits=3),
                 f"{100 * straight.mean():.1f}",
             ]
         )
@@ -308,25 +308,6 @@ def _lines_of(mesh: gc.TriangleMesh) -> Lines:
     across /= np.linalg.norm(across, axis=1)[:, None]
     angles = rng.uniform(0.0, 2.0 * math.pi, LINES)[:, None]
     return Lines(starts, np.cos(angles) * along + np.sin(angles) * across, length)
-
-
-def _paired(
-    plain: Callable[[], Any], other: Callable[[], Any], pairs: int
-) -> tuple[list[float], list[float], Any]:
-    """Return the seconds of two calls by turns, each first every other time; and the result."""
-    plain_s, other_s = [], []
-    for i in range(pairs):
-        if i % 2:
-            plain_s.append(timed(plain)[0])
-        seconds, result = timed(other)
-        other_s.append(seconds)
-        if not i % 2:
-            plain_s.append(timed(plain)[0])
-    return plain_s, other_s, result
-
-
-def _ratio(these_s: list[float], those_s: list[float]) -> float:
-    return median(this / that for this, that in zip(these_s, those_s, strict=True))
 
 
 def _first_of_ours(vertices: Floats, faces: Ints) -> tuple[gc.TriangleMesh, gc.LogMap]:

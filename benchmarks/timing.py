@@ -42,3 +42,29 @@ def by_turns(
         if time.perf_counter() - began > patience:
             break
     return [(median(some), result) for some, result in zip(seconds, results, strict=True)]
+
+
+def paired(
+    plain: Callable[[], Any],
+    other: Callable[[], Result],
+    pairs: int,
+    clock: Callable[[], float] = time.perf_counter,
+) -> tuple[list[float], list[float], Result]:
+    """Return the seconds of two calls by turns, each first every other time; and the last result.
+
+    The result is that of the other call.
+    """
+    plain_s, other_s = [], []
+    for i in range(pairs):
+        if i % 2:
+            plain_s.append(timed(plain, clock)[0])
+        seconds, result = timed(other, clock)
+        other_s.append(seconds)
+        if not i % 2:
+            plain_s.append(timed(plain, clock)[0])
+    return plain_s, other_s, result
+
+
+def ratio(these_s: Sequence[float], those_s: Sequence[float]) -> float:
+    """Return the median of the ratios of seconds in pairs."""
+    return median(this / that for this, that in zip(these_s, those_s, strict=True))

@@ -104,7 +104,8 @@ def _from_point(
 ) -> float:
     """Return a vector at a point, in its tangent plane, as one in the frame of a face ahead."""
     if point.vertex_index is not None:
-        return way + turn - frame_at(mesh, point).scale * _angle_at(mesh, point, face, way)
+        scale: float = frame_at(mesh, point).scale
+        return way + turn - scale * _angle_at(mesh, point, face, way)
     faces = weights_by_face(mesh, point)
     number = min(max(int(turn // math.pi), 0), len(faces) - 1)
     into, weights = list(faces.items())[number]
@@ -121,7 +122,8 @@ def _to_point(
     """
     if point.vertex_index is not None:
         back = _angle_at(mesh, point, face, way + math.pi)
-        return frame_at(mesh, point).scale * back + math.pi + vector - way
+        scale: float = frame_at(mesh, point).scale
+        return scale * back + math.pi + vector - way
     faces = weights_by_face(mesh, point)
     for number, (into, weights) in enumerate(faces.items()):
         turned = _over_edge(mesh, point, vector, face, into)

@@ -7,6 +7,7 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.errors import InvalidArgument, InvalidPoint, NoDirection, NoTangentPlane
+from geodesic_core.kernels.paths.straight_lines import TOGETHER
 from geodesic_core.tolerances import NO_DIRECTION, THROUGH_VERTEX
 from tests.core.fields.test_log_map import apart, sources_of
 from tests.support import zoo
@@ -186,3 +187,35 @@ def test_errors_tell_which_of_many_lines_they_are_about():
     with pytest.raises(NoDirection) as refusal:
         gc.trace(mesh, [good, good], [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]], 1.0)
     assert refusal.value.index == 1
+
+
+def test_a_vertex_of_no_face_has_no_tangent_plane():
+    mesh = gc.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 5, 5]], [[0, 1, 2]])
+    with pytest.raises(NoTangentPlane, match="vertex 3 has no tangent plane, as it belongs to no"):
+        gc.trace(mesh, 3, 0.0, 1.0)
+    with pytest.raises(NoTangentPlane, match="belongs to no face"):
+        gc.log_map(mesh, 3)
+
+
+def test_more_lines_than_take_turns_are_those_of_single_calls():
+    mesh = plane(1)
+    starts = sources_of(mesh, 3 * TOGETHER)
+    turns = np.random.default_rng(2).uniform(0.0, 6.0, len(starts))
+    lengths = np.linspace(0.0, 12.0, len(starts))[::-1]
+    for stops in ("straight", "stop"):
+        many = gc.trace(mesh, starts, turns, lengths, at_vertices=stops)
+        for line, *question in zip(many, starts, turns, lengths, strict=True):
+            one = gc.trace(mesh, *question, at_vertices=stops)
+            np.testing.assert_array_equal(line.points, one.points)
+            np.testing.assert_array_equal(line.faces, one.faces)
+            assert (line.length, line.stopped) == (one.length, one.stopped)
+
+
+def test_a_full_trail_is_continued(monkeypatch):
+    mesh = gc.TriangleMesh(*zoo.box_grid((3, 3, 3)))
+    asked = [gc.SurfacePoint.face(0, (0.2, 0.3, 0.5))] * 40, np.linspace(0.1, 6.0, 40), 30.0
+    at_once = gc.trace(mesh, *asked)
+    monkeypatch.setattr("geodesic_core.fields.straight_lines._TRAIL", 4 * TOGETHER)
+    for line, other in zip(gc.trace(mesh, *asked), at_once, strict=True):
+        np.testing.assert_array_equal(line.points, other.points)
+        np.testing.assert_array_equal(line.faces, other.faces)
