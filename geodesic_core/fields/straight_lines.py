@@ -40,7 +40,7 @@ from geodesic_core.kernels.paths.straight_lines import (
     trace_lines,
 )
 from geodesic_core.mesh.frames import directions_of, frames_at
-from geodesic_core.mesh.surface_curve import fill, in_space, locations_of, point_of, rows_of
+from geodesic_core.mesh.surface_curve import fill, locations_of, point_of, rows_of
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import WEIGHT
@@ -208,14 +208,14 @@ def _as_paths(
     ends = rows_of(located, last)
     directions, stopped = _end_directions(mesh, ends, ints, floats), _words(mesh, ends, ints)
     done = np.where(is_inside, lengths, lengths - floats[:, LEFT])
-    in_its_space = in_space(mesh, located)
+    located.points[:] += mesh.origin  # as `in_space` does, which copies
     return [
         StraightLine(
             mesh=mesh,
             faces=faces[lo + 1 : hi],
             closed=False,
             length=length,
-            located=rows_of(in_its_space, slice(lo, hi)),
+            located=rows_of(located, slice(lo, hi)),
             error_bound=EXACT,
             steps=None,
             stopped=word,

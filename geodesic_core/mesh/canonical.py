@@ -155,7 +155,7 @@ def check_weights(weights: Any, face: int, name: str) -> None:
     is_sound = (
         isinstance(weights, Sequence | np.ndarray)
         and len(weights) == 3
-        and all(is_number(weight) for weight in weights)
+        and all(map(is_number, weights))
         and min(weights) >= -WEIGHT_ERROR
         and abs(sum(weights) - 1.0) <= WEIGHT_ERROR
     )

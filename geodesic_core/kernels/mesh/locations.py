@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints, Longs
-from geodesic_core.kernels.jit import borrowed, inlined, kernel
-from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL, Embedding, Topology, next_around
+from geodesic_core.kernels.jit import borrowed, inlined, kernel, pointer, prefetch
+from geodesic_core.kernels.mesh.half_edges import HEAD, ROW, TAIL, Embedding, Topology, next_around
 from geodesic_core.tolerances import WEIGHT
 
 
@@ -34,6 +34,10 @@ def empty_locations(count: int) -> Locations:
     )
 
 
+AHEAD = 16
+"""Nodes from one to that whose half-edge is fetched meanwhile"""
+
+
 @kernel
 def locate_nodes(
     embedding: Embedding, faces: Ints, nodes: Ints, parameters: Floats, locations: Locations
@@ -44,7 +48,10 @@ def locate_nodes(
     """
     embedding, locations = borrowed(embedding), borrowed(locations)
     faces, topology = borrowed(faces), embedding.topology
+    links = pointer(topology.links)
     for i in range(len(nodes)):
+        if i + AHEAD < len(nodes):
+            prefetch(links, ROW * max(nodes[i + AHEAD], 0))
         v, t = -1 - nodes[i], parameters[i]
         if v < 0 and (t == 0.0 or 1.0 - t == 0.0 or 1.0 - t == 1.0):
             # At a vertex, also where t is too small to tell
