@@ -437,8 +437,8 @@ class LogMapAnswer(BaseModel):
 class StraightLine(BaseModel):
     """A straightest line."""
 
-    stopped: Literal["length", "boundary", "barrier", "vertex", "non_manifold"] = Field(
-        description="What it ends at; `length` if it is as long as asked for"
+    stopped: Literal["length", "boundary", "barrier", "vertex", "non_manifold", "collapsed"] = (
+        Field(description="What it ends at; `length` if it is as long as asked for")
     )
     length: float = Field(description="The length in mesh units")
     end_direction: float | None = Field(

@@ -293,7 +293,7 @@ class StraightLine:
     locations: Sequence[Mapping[str, Any]]
     """Its K points, each as a face and the weights of its corners"""
     stopped: str
-    """``length``, ``boundary``, ``barrier``, ``vertex`` or ``non_manifold``"""
+    """``length``, ``boundary``, ``barrier``, ``vertex``, ``non_manifold`` or ``collapsed``"""
     end_direction: float
     """Radians at the last point; NaN where directions have no meaning"""
 

@@ -3032,7 +3032,7 @@ export interface components {
              * @description What it ends at; `length` if it is as long as asked for
              * @enum {string}
              */
-            stopped: "length" | "boundary" | "barrier" | "vertex" | "non_manifold";
+            stopped: "length" | "boundary" | "barrier" | "vertex" | "non_manifold" | "collapsed";
             /**
              * Length
              * @description The length in mesh units

@@ -24,6 +24,7 @@ from geodesic_core.kernels.mesh.half_edges import (
 from geodesic_core.kernels.mesh.locations import Locations, empty_locations, locate_nodes
 from geodesic_core.kernels.paths.straight_lines import (
     AT_BOUNDARY,
+    AT_COLLAPSED,
     AT_LENGTH,
     AT_NON_MANIFOLD,
     AT_VERTEX,
@@ -45,13 +46,14 @@ from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import WEIGHT
 
-Stopped = Literal["length", "boundary", "barrier", "vertex", "non_manifold"]
+Stopped = Literal["length", "boundary", "barrier", "vertex", "non_manifold", "collapsed"]
 
 _WORDS: dict[int, Stopped] = {
     AT_LENGTH: "length",
     AT_BOUNDARY: "boundary",
     AT_VERTEX: "vertex",
     AT_NON_MANIFOLD: "non_manifold",
+    AT_COLLAPSED: "collapsed",
 }
 
 _TRAIL = 1 << 16
@@ -74,7 +76,8 @@ class StraightLine(GeodesicPath):
     stopped: Stopped
     """What it ends at: ``"length"``, as long as asked for; ``"boundary"``; ``"barrier"``;
     ``"vertex"``, where lines were to end there; ``"non_manifold"``, an edge of three faces or more,
-    or a vertex where several fans of faces meet"""
+    or a vertex where several fans of faces meet; ``"collapsed"``, faces without
+    area, in which it would circle on a spot"""
     end_direction: float
     """Direction in which it would go on, radians in the frame of its last point; NaN where that has
     no tangent plane"""
@@ -251,9 +254,12 @@ def _ends_in_faces(mesh: TriangleMesh, h: Longs, x: Floats, y: Floats) -> Locati
     topology = mesh.topology
     columns = [LENGTH, LENGTH_LEFT, COS_LEFT, SIN_LEFT]
     length, to_left, cosine, sine = topology.geometry[h][:, columns].T
+    apex = cosine * to_left
     with np.errstate(invalid="ignore", divide="ignore"):
-        up = np.where(sine > 0.0, np.clip(y / (sine * to_left), 0.0, 1.0), 0.0)
-    along = np.clip((x - up * cosine * to_left) / length, 0.0, 1.0 - up)
+        beyond = np.where(x < 0.0, x / apex, (x - length) / (apex - length))
+        flat = np.where((x < 0.0) | (x > length), beyond, 0.0)  # the face has no area
+        up = np.clip(np.where(sine > 0.0, y / (sine * to_left), flat), 0.0, 1.0)
+    along = np.clip((x - up * apex) / length, 0.0, 1.0 - up)
     share = np.stack([np.maximum(1.0 - along - up, 0.0), along, up], axis=1)
     faces = topology.outer_face[h // 3]
     at = topology.links[h][:, [TAIL, HEAD, APEX]]

@@ -7,6 +7,7 @@ import numpy as np
 from geodesic_core.arrays import Floats
 from geodesic_core.errors import NoTangentPlane
 from geodesic_core.kernels.mesh.frames import Frame, find_frames
+from geodesic_core.kernels.mesh.half_edges import FANS
 from geodesic_core.kernels.mesh.locations import Locations
 from geodesic_core.mesh.canonical import cross
 from geodesic_core.mesh.curve import weights_by_face
@@ -51,10 +52,10 @@ def planes_at(mesh: TriangleMesh, located: Locations) -> Frame:
 
 
 def _why_no_plane(mesh: TriangleMesh, point: SurfacePoint) -> str:
-    count = len(weights_by_face(mesh, point))
-    why = f"{count} faces meet at an edge"
+    why = f"{len(weights_by_face(mesh, point))} faces meet at an edge"
     if point.vertex_index is not None:
-        why = "several fans of faces meet" if count else "no face is around it that is not blocked"
+        has_fans = mesh.topology.flags[mesh.topology.inner_vertex[point.vertex_index]] & FANS
+        why = "several fans of faces meet" if has_fans else "no free face has an angle there"
     return (
         f"{point} has no tangent plane, as {why}: directions have no meaning there; choose a point "
         "beside it"

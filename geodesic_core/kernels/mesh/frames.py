@@ -103,7 +103,7 @@ def find_frames(topology: Topology, faces: Ints, inner_face: Ints, located: Loca
 def frame_at_vertex(topology: Topology, faces: Ints, inner: int, face: int, v: int) -> Frame:
     """Return the frame of inner vertex v, whose lowest face is given by both its numbers."""
     geometry, total, flags = topology.geometry, topology.total_angle[v], topology.flags[v]
-    if flags & FANS:
+    if flags & FANS or total == 0.0:
         return Frame(math.nan, 1.0, total, False)
     h = half_edge_from(topology, inner, v)
     ahead = topology.inner_vertex[faces[face, (corner_of(topology, faces, face, v) + 1) % 3]]

@@ -46,13 +46,15 @@ AT_LENGTH = 1
 AT_BOUNDARY = 2
 AT_VERTEX = 3  # lines are to end at vertices
 AT_NON_MANIFOLD = 4  # an edge of several faces, or a vertex where several fans meet
+AT_COLLAPSED = 5  # it circles in faces without area, on a spot
 
 # Columns of the state of lines, a row each
 VERTEX = 0  # int: the line is at this vertex; -1 where it is on a half-edge
 HALF_EDGE = 1  # int: the line is on it, about to cross its face
 STOP = 2  # int: see above
 PASSED = 3  # int: edges and vertices that the line has passed
-INTS = 4
+STILL = 4  # int: of these, how many since it last had less to go
+INTS = 5
 ANGLE = 0  # float: at a vertex, the direction in its unfolded fan, radians
 X = 1  # float: on a half-edge, the position in its frame
 Y = 2  # float: 0 but at the end of a line
@@ -172,8 +174,11 @@ def pass_face(
         trail.numbers[count], trail.parameters[count] = ints[i, PASSED], parameter
         trail.faces[count] = line.half_edge // 3
         count, ints[i, PASSED] = count + 1, ints[i, PASSED] + 1
+        ints[i, STILL] = ints[i, STILL] + 1 if line.left == floats[i, LEFT] else 0
         if v >= 0:
             line = through_vertex(topology, line, v, stops)
+        elif ints[i, STILL] > len(topology.links):  # it comes by an edge again
+            line = stopped(line, AT_COLLAPSED)
         else:
             line = over_edge(topology, line, m, parameter)
             fetch_face(topology, line.half_edge)
@@ -238,7 +243,7 @@ def cross_face(topology: Topology, line: Line) -> tuple[Line, int, float]:
     ax, ay = geometry[h, COS_LEFT] * to_left, geometry[h, SIN_LEFT] * to_left
     to_apex = math.hypot(ax - x, ay)
     turn = dx * ay - dy * (ax - x)  # times the distance of the apex: how far the line passes it by
-    if dy <= THROUGH_VERTEX:  # along the half-edge
+    if dy <= THROUGH_VERTEX and (dx > 0.0 or x > 0.0):  # along the half-edge
         far = length - x if dx > 0.0 else x
         node, parameter = h, 1.0 if dx > 0.0 else 0.0
     elif abs(turn) <= THROUGH_VERTEX * to_apex:

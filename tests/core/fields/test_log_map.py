@@ -255,7 +255,7 @@ def test_a_point_on_an_edge_of_three_faces_has_no_plane():
 def test_a_vertex_that_is_in_no_face_has_no_plane(vertex, barriers):
     corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [9, 9, 9]]
     mesh = gc.TriangleMesh(corners, [[0, 1, 2], [1, 3, 2]]).with_barriers(barriers)
-    told = f"vertex {vertex} has no tangent plane, as no face is around it"
+    told = f"vertex {vertex} has no tangent plane, as no free face"
     for call in (gc.log_map, gc.relax_points, gc.mean_point):
         with pytest.raises(NoTangentPlane, match=told):
             call(mesh, [vertex] if call is not gc.log_map else vertex)

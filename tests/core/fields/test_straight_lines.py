@@ -191,10 +191,34 @@ def test_errors_tell_which_of_many_lines_they_are_about():
 
 def test_a_vertex_of_no_face_has_no_tangent_plane():
     mesh = gc.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 5, 5]], [[0, 1, 2]])
-    with pytest.raises(NoTangentPlane, match="vertex 3 has no tangent plane, as it belongs to no"):
+    with pytest.raises(NoTangentPlane, match="vertex 3 has no tangent plane, as no free face"):
         gc.trace(mesh, 3, 0.0, 1.0)
-    with pytest.raises(NoTangentPlane, match="belongs to no face"):
+    with pytest.raises(NoTangentPlane, match="no free face has an angle"):
         gc.log_map(mesh, 3)
+
+
+FLAT = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [1.5, 0, 0]]
+"""Points of a line: whatever faces join them have no area"""
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.5, 1.5, 3.0, math.pi, 5.0])
+@pytest.mark.parametrize("start", range(4))
+def test_lines_in_faces_without_area_end(start, angle):
+    line = gc.trace(gc.TriangleMesh(FLAT[:3], [[0, 1, 2]]), 1, math.pi, 0.25)
+    assert line.stopped == "length"
+    assert line.points.tolist() == [[1.0, 0.0, 0.0], [0.75, 0.0, 0.0]]
+    closed = gc.TriangleMesh(FLAT, [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+    try:
+        line = gc.trace(closed, start, angle, 0.25, deadline_s=60.0)
+    except NoTangentPlane:
+        assert start in (0, 2)  # where all angles are 0
+        return
+    if line.stopped == "collapsed":
+        assert line.length < 0.25
+        assert len(line.faces) > len(closed.faces)
+    else:
+        assert line.stopped == "length"
+        assert line.length == 0.25
 
 
 def test_more_lines_than_take_turns_are_those_of_single_calls():

@@ -16,6 +16,7 @@ const ENDS: Record<StraightLine["stopped"], string> = {
   barrier: "up to a barrier",
   vertex: "up to a vertex",
   non_manifold: "up to where more than two faces meet",
+  collapsed: "up to faces without area",
 };
 
 export class Walks {
