@@ -20,6 +20,7 @@ from geodesic_core.cutting.cut_mesh import CutMesh
 from geodesic_core.errors import GeodesicError
 from geodesic_core.fields.borders import Border
 from geodesic_core.fields.cells import Cells
+from geodesic_core.fields.certificate import Certificate
 from geodesic_core.fields.distance_field import DistanceField
 from geodesic_core.fields.isolines import resolve_chord_error, spaced_levels
 from geodesic_core.fields.log_map import LogMap, Polar
@@ -71,6 +72,7 @@ __all__ = [
     "WEIGHT_ERROR",
     "Border",
     "Cells",
+    "Certificate",
     "Control",
     "Curve",
     "CutMesh",

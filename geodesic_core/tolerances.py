@@ -434,3 +434,16 @@ SMALLEST_MOVE = 1e-9
 
 What moves by the mean of distances cannot be placed better than these are squared and summed.
 """
+
+WIDENING = 1e-10
+"""Share of its edge by which a window is widened on both sides in a certificate.
+
+Rounding leaves gaps between neighbouring windows. A certificate needs a value everywhere, and may
+take that of a window a little beyond its end: what is wrong by that is measured, and told.
+"""
+
+CERTIFIED = 1e-8
+"""Share of the largest distance: bounds of a certificate may differ by this and prove a field.
+
+Those of exact fields differ by 1e-12 to 1e-9, most of which is rounding in the proof.
+"""

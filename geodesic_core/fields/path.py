@@ -27,7 +27,8 @@ class ErrorBound:
     """Bound of the difference between an answer and the exact one.
 
     ``value`` is a share of the exact answer where ``type`` is ``"relative"``, else mesh units.
-    ``kind`` tells whether the bound is proved or estimated. For approximate distances it is proved
+    ``kind`` tells whether the bound is proved in general, estimated, or certified: proved for this
+    answer, rounding included, see `DistanceField.certify`. For approximate distances it is proved
     that they are too short by no more than the bound. That they are never too long is argued and
     measured, but not proved.
 
@@ -40,7 +41,7 @@ class ErrorBound:
 
     type: Literal["relative", "absolute"]
     value: float
-    kind: Literal["guaranteed", "estimated"]
+    kind: Literal["guaranteed", "estimated", "certified"]
 
     def __str__(self) -> str:
         if self.value == 0.0 and self.kind == "guaranteed":

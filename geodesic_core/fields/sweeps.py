@@ -138,6 +138,10 @@ class WholeSweep(ABC):
         return face_windows_of(self.run_for(control, windows=faces))
 
     @abstractmethod
+    def upper_bounds(self, distances: Floats) -> Floats:
+        """Return upper bounds of the exact distances, of which its own are lower bounds."""
+
+    @abstractmethod
     def faces_passed(self, distances: Floats, levels: Sequence[float]) -> Flags:
         """Return the inner faces that isolines may pass, by the sweep's distances; flags (F,)."""
 

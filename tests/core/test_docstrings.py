@@ -54,6 +54,7 @@ RECORDS |= {"gc.MatrixFile", "gc.Nearest", "gc.Sample", "gc.SearchStep", "gc.Swe
 RECORDS |= {
     "gc.Border",
     "gc.Cells",
+    "gc.Certificate",
     "gc.CutMesh",
     "gc.FarthestPoints",
     "gc.MeanPoint",

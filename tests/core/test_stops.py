@@ -115,6 +115,7 @@ CALLS = {name: Call(mesh, ask) for name, ask in SWEEPS.items()}
 CALLS |= {name: Call(solver, ask) for name, ask in SEARCHES.items()}
 CALLS |= {name: Call(solver, ask, 1) for name, ask in MATRICES.items()}  # threads are asked, too
 CALLS |= {f"{f}: {m}": Call(FIELDS[f], METHODS[m]) for f, m in PAIRS if computes(f, m)}
+CALLS["certify"] = Call(FIELDS["exact"], lambda field, **watch: field.certify(**watch).lower)
 CALLS["cells"] = Call(FIELDS["two"], lambda field, **watch: field.cells(**watch).cell_of)
 READY = {f"{f}: {m}": Call(FIELDS[f], METHODS[m]) for f, m in PAIRS if not computes(f, m)}
 TO_ONE = [name for name in CALLS if "_at" not in name and "path_to" not in name]

@@ -1,0 +1,314 @@
+"""Certificates: lower and upper bounds of the distances of a field, with what proves them."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from geodesic_core import verify
+from geodesic_core.arrays import Floats, Longs
+from geodesic_core.control import Control
+from geodesic_core.errors import InvalidArgument
+from geodesic_core.fields.path import located_path
+from geodesic_core.fields.question import Question
+from geodesic_core.fields.sweep_result import SweepResult, all_winners
+from geodesic_core.fields.sweeps import Sweep, WholeSweep
+from geodesic_core.files import as_output, written
+from geodesic_core.kernels.certificates.edge_functions import (
+    CONE,
+    FOOT,
+    HEIGHT,
+    HIGH,
+    LOW,
+    SIGMA,
+    edge_function,
+)
+from geodesic_core.kernels.front import window
+from geodesic_core.kernels.front.window import B0, B1, SX, SY
+from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL
+from geodesic_core.kernels.paths.backtracing import Winners
+from geodesic_core.kernels.retained.face_windows import FaceWindows, face_windows_of
+from geodesic_core.mesh.surface_point import SurfacePoint
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.tolerances import CERTIFIED, WIDENING
+
+_SAVED_PATHS = 100
+"""Paths in a file, to the farthest vertex and others: they tell how large the gap is"""
+
+_TOGETHER = 2048
+"""Paths that are measured at once"""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Certificate:
+    """Proved bounds of the distances of a field, and what proves them.
+
+    The lower bounds are proved by a function on the edges, see `geodesic_core.verify`; the upper
+    ones are lengths of paths. Both hold to the last bit for the mesh as its numbers say, whatever
+    the solver has done.
+
+    Examples
+    --------
+    >>> certificate = gc.exact_distance(gc.samples.sphere(80), 0).certify()
+    >>> certificate.holds, certificate.relative_gap < 1e-9
+    (True, True)
+    """
+
+    mesh: TriangleMesh
+    """The surface, with the barriers of the call."""
+    lower: Floats
+    """(V,) mesh units: no vertex is nearer; infinite where no path leads from a source."""
+    upper: Floats
+    """(V,) mesh units: lengths of paths, start distances counted; infinite where none leads."""
+    violations: Floats
+    """(F,) mesh units: by how much the function may rise too fast in each face, 0 or rounding."""
+    holds: bool
+    """Whether the distances of the field are proved: that exact ones are, and that approximate ones
+    are within their error, and no longer than exact ones; to 1e-8 of the largest distance."""
+    arrays: dict[str, Floats | Longs]
+    """The function on the edges, and paths to some of the vertices."""
+
+    @property
+    def relative_gap(self) -> float:
+        """The largest difference of the bounds, as a share of the largest distance."""
+        reached = np.isfinite(self.upper)
+        upper = self.upper[reached]
+        gap, largest = float((upper - self.lower[reached]).max()), float(upper.max())
+        return gap / largest if largest > 0.0 else 0.0
+
+    @property
+    def worst_face(self) -> int:
+        """The face in which the function rises most too fast."""
+        return int(self.violations.argmax())
+
+    @property
+    def worst_violation(self) -> float:
+        """By how much it does there, mesh units."""
+        return float(self.violations[self.worst_face])
+
+    def save(self, path: str | Path) -> None:
+        """Write what proves the bounds into a file, for ``geodesic-verify``.
+
+        Parameters
+        ----------
+        path
+            The file, which ends in ``.npz``. It holds neither mesh nor sources.
+
+        Raises
+        ------
+        InvalidArgument
+            The path does not end in ``.npz``, or cannot be written.
+
+        Examples
+        --------
+        >>> from pathlib import Path
+        >>> from tempfile import mkdtemp
+        >>> file = Path(mkdtemp()) / "proof.npz"
+        >>> gc.exact_distance(gc.samples.plane(2), 0).certify().save(file)
+        >>> np.load(file)["values"].round(3).tolist()
+        [0.0, 1.0, 1.0, 1.414]
+        """
+        with written(as_output(path, ".npz")) as file:
+            np.savez_compressed(file, allow_pickle=False, **self.arrays)
+
+    def __repr__(self) -> str:
+        state = "holds" if self.holds else "does not hold"
+        return f"Certificate({state}, gap {self.relative_gap:.2g} of the largest distance)"
+
+
+def certified(sweep: Sweep, result: SweepResult, control: Control) -> Certificate:
+    """Return the certificate of the result of a sweep.
+
+    Raises
+    ------
+    InvalidArgument
+        The sweep is a fast one, or has curves as sources.
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As the control says.
+    """
+    if not isinstance(sweep, WholeSweep):
+        raise InvalidArgument(
+            "a fast field has no certificate, as its windows leave parts of edges dark: certify an "
+            "exact or an approximate one"
+        )
+    whole, question = sweep, sweep.question
+    if question.has_curves:
+        raise InvalidArgument("a field with curves as sources has no certificate yet: give points")
+    winners, windows = result.winners, result.windows
+    if winners is None or windows is None or math.isfinite(question.max_distance):
+        whole = replace(whole, question=replace(question, max_distance=math.inf))
+        wave = whole.run(control.for_part(0, 4), "windows")
+        winners, windows = all_winners(wave), face_windows_of(wave)
+    mesh = question.mesh
+    values = winners.vertices.distance[mesh.topology.inner_vertex]
+    surface = verify.Surface(
+        None if mesh.lengths is not None else mesh.vertices,
+        mesh.faces,
+        mesh.lengths,
+        values,
+        mesh.barriers,
+    )
+    values = values[surface.label]
+    sources = [
+        _source(line[0], start)
+        for line, start in zip(question.polylines, question.start_distances.tolist(), strict=True)
+    ]
+    arrays = function_on_edges(mesh, surface, windows, values, sources)
+    proof = verify.prove(surface, sources, arrays, control.for_part(1, 4).checkpoint)
+    upper, paths = _upper_bounds(
+        question, surface, sources, winners, values, control.for_part(2, 4)
+    )
+    reached = np.isfinite(upper)
+    slack = CERTIFIED * float(upper[reached].max())
+    most = whole.upper_bounds(values[reached])
+    values, lower, high = (array[reached] for array in (values, proof.lower, upper))
+    holds = bool((values - lower <= slack).all() and (high - most <= slack).all())
+    if control.progress is not None:
+        control.progress(1.0)
+    return Certificate(mesh, proof.lower, upper, proof.tau, holds, arrays | paths)
+
+
+def function_on_edges(
+    mesh: TriangleMesh,
+    surface: verify.Surface,
+    windows: FaceWindows,
+    values: Floats,
+    sources: Sequence[verify.Source],
+) -> dict[str, Floats | Longs]:
+    """Return the least of windows and of distances of the ends, on each edge of two faces or more.
+
+    Sources on an edge count there as well. Windows are a little wider than they are: rounding
+    leaves gaps between them.
+    """
+    edges, length, inside = surface.edges, surface.length.m, np.flatnonzero(~surface.is_rim)
+    everywhere, none = length[inside], np.zeros(len(inside))
+    of_ends = [
+        np.stack([k * everywhere, none, values[edges[inside, k]], none, everywhere], axis=1)
+        for k in (0, 1)
+    ]
+    at, of_windows = _cones_of_windows(mesh, surface, windows)
+    on, of_sources = _cones_of_sources(surface, sources)
+    edge = np.concatenate([inside, inside, on, at])
+    cones = np.concatenate([*of_ends, of_sources, of_windows])
+    is_kept = ~surface.is_rim[edge]
+    order = np.flatnonzero(is_kept)[np.argsort(edge[is_kept], kind="stable")]
+    cones, first = cones[order], np.searchsorted(edge[order], np.arange(len(edges) + 1))
+    counts, which, ends = edge_function(first, cones, length)
+    share = np.minimum(ends / np.repeat(length, counts), 1.0)
+    share[np.cumsum(counts)[counts > 0] - 1] = 1.0
+    foot, height, sigma = (cones[which, k] for k in (FOOT, HEIGHT, SIGMA))
+    return {
+        "values": values,
+        "pieces": counts,
+        "a": foot,
+        "h": height,
+        "sigma": sigma,
+        "t": share,
+    }
+
+
+def _cones_of_windows(
+    mesh: TriangleMesh, surface: verify.Surface, windows: FaceWindows
+) -> tuple[Longs, Floats]:
+    """Return the edge of each window, and its cone."""
+    topology, rows = mesh.topology, windows.windows
+    h = np.repeat(np.arange(len(topology.links)), np.diff(windows.first))
+    tail, head = (surface.label[topology.outer_vertex[topology.links[h, k]]] for k in (TAIL, HEAD))
+    edge = _edges_between(surface, tail, head)
+    length, is_turned = surface.length.m[edge], tail > head
+    cones = np.empty((len(rows), CONE))
+    cones[:, FOOT] = np.where(is_turned, length - rows[:, SX], rows[:, SX])
+    cones[:, HEIGHT], cones[:, SIGMA] = np.abs(rows[:, SY]), rows[:, window.SIGMA]
+    begin = np.where(is_turned, length - rows[:, B1], rows[:, B0])
+    end = np.where(is_turned, length - rows[:, B0], rows[:, B1])
+    cones[:, LOW], cones[:, HIGH] = begin - WIDENING * length, end + WIDENING * length
+    return edge, cones
+
+
+def _cones_of_sources(
+    surface: verify.Surface, sources: Sequence[verify.Source]
+) -> tuple[Longs, Floats]:
+    """Return the edges that sources lie on, none at a vertex, and their cones."""
+    edges, cones = [], []
+    for source in sources:
+        held = np.flatnonzero(source.weights)
+        if source.vertex < 0 and len(held) == 2:
+            low, high = sorted(surface.label[surface.given[source.face, k]] for k in held)
+            edge = int(_edges_between(surface, np.array([low]), np.array([high]))[0])
+            is_high = surface.label[surface.given[source.face]] == high
+            length = surface.length.m[edge]
+            edges.append(edge)
+            share = float(np.array(source.weights)[is_high][0])
+            cones.append([share * length, 0.0, source.start, 0.0, length])
+    return np.array(edges, np.int64), np.array(cones).reshape(-1, CONE)
+
+
+def _edges_between(surface: verify.Surface, tails: Longs, heads: Longs) -> Longs:
+    """Return the edges between vertices."""
+    keys = surface.edges[:, 0] * surface.count + surface.edges[:, 1]
+    given = np.minimum(tails, heads) * surface.count + np.maximum(tails, heads)
+    return np.searchsorted(keys, given)
+
+
+def _source(point: SurfacePoint, start: float) -> verify.Source:
+    if point.vertex_index is not None:
+        return verify.Source(point.vertex_index, -1, (0.0, 0.0, 0.0), start)
+    return verify.Source(-1, point.face_index, point.barycentric, start)
+
+
+def _upper_bounds(
+    question: Question,
+    surface: verify.Surface,
+    sources: list[verify.Source],
+    winners: Winners,
+    values: Floats,
+    control: Control,
+) -> tuple[Floats, dict[str, Floats | Longs]]:
+    """Return lengths of paths to all vertices, and some of the paths."""
+    upper = np.where(np.isfinite(values), np.inf, values)
+    for source in sources:
+        if source.vertex >= 0:
+            is_there = surface.label == surface.label[source.vertex]
+            upper[is_there] = np.minimum(upper[is_there], source.start)
+    ends = np.flatnonzero(np.isfinite(values) & (upper > values))
+    ends = ends[surface.label[ends] == ends]
+    chunks = range(0, len(ends), _TOGETHER)
+    for number, i in enumerate(chunks):
+        part = control.for_part(number, len(chunks))
+        paths = _paths_to(question, surface, winners, ends[i : i + _TOGETHER], part)
+        at, lengths = verify.measure(surface, sources, paths)
+        upper[at] = np.minimum(upper[at], lengths)
+    upper = upper[surface.label]
+    spread = np.linspace(0, len(ends) - 1, min(_SAVED_PATHS, len(ends))).astype(int)
+    some = ends[np.argsort(values[ends])[spread]]
+    paths = _paths_to(question, surface, winners, some, control)
+    return upper, {f"path_{name}": array for name, array in paths._asdict().items()}
+
+
+def _paths_to(
+    question: Question, surface: verify.Surface, winners: Winners, ends: Longs, control: Control
+) -> verify.Paths:
+    """Return the paths to some vertices, by weights in the faces that they cross."""
+    mesh = question.mesh
+    first, faces, at, weights = [0], [np.empty(0, np.int32)], [], []
+    corners = surface.label[mesh.faces]
+    for v in control.watched(mesh.topology.inner_vertex[ends].tolist()):
+        located, crossed = located_path(mesh, winners, question.nodes, v)
+        first.append(first[-1] + len(crossed))
+        faces.append(crossed)
+        at.append(np.stack([located.faces[:-1], located.faces[1:]]))
+        weights.append(np.stack([located.weights[:-1], located.weights[1:]]))
+    crossed = np.concatenate(faces)
+    points = np.concatenate(at, axis=1) if at else np.empty((2, 0), np.int32)
+    shares = np.concatenate(weights, axis=1) if at else np.empty((2, 0, 3))
+    sides = (_weights_in(corners[crossed], corners[points[k]], shares[k]) for k in (0, 1))
+    return verify.Paths(np.array(first), crossed, *sides)
+
+
+def _weights_in(corners: Longs, given: Longs, weights: Floats) -> Floats:
+    """Return weights at other corners, of points that both triangles hold, (K, 3)."""
+    is_same = corners[:, :, None] == given[:, None, :]
+    moved: Floats = (is_same * weights[:, None, :]).sum(axis=2)
+    return moved

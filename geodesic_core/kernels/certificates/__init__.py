@@ -1,0 +1,1 @@
+"""Kernels of certificates: the function on the edges by which distances are proved."""

@@ -1,0 +1,115 @@
+"""The function on the edges of a certificate: the lower envelope of the cones over each of them.
+
+A cone is σ + √((x - a)² + h²), x mesh units from the edge's lower vertex. Windows on the edge, from
+each of its faces, are cones within their ends; the distance of an end of the edge is one all along.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from geodesic_core.arrays import Floats, Ints, Longs
+from geodesic_core.kernels.borders.bisectors import Regions
+from geodesic_core.kernels.borders.envelopes import REGION, START, envelope_along
+from geodesic_core.kernels.curves.regions import SIDES_END, put_disc, put_side
+from geodesic_core.kernels.curves.rows import with_room
+from geodesic_core.kernels.jit import inlined, kernel
+
+# Columns of a cone
+FOOT = 0  # a
+HEIGHT = 1  # h, 0 or more
+SIGMA = 2
+LOW = 3  # where it begins
+HIGH = 4  # and ends
+CONE = 5
+
+_CORRECTIONS = 4
+"""Newton steps by which the place where two cones cross is corrected"""
+
+
+class EdgeFunction(NamedTuple):
+    """Pieces along edges, those of an edge one after the other."""
+
+    counts: Ints
+    """(E,): pieces of each edge"""
+    cones: Longs
+    """(N,): the cone of each piece"""
+    ends: Floats
+    """(N,): where it ends, mesh units from the lower vertex"""
+
+
+@kernel
+def edge_function(first: Longs, cones: Floats, lengths: Floats) -> EdgeFunction:
+    """Return the lower envelopes of the cones of each edge, which must cover it; O(cones²) an edge.
+
+    Those of edge e are rows ``first[e]`` to ``first[e + 1]``; an edge without cones has no pieces.
+    """
+    counts = np.zeros(len(lengths), np.int32)
+    rows, ends, total = np.empty((2 * len(cones), 1), np.int64), np.empty((2 * len(cones), 1)), 0
+    regions, labels = np.zeros((1, SIDES_END)), np.zeros(1, np.int32)
+    for e in range(len(lengths)):
+        base, number = first[e], first[e + 1] - first[e]
+        if number == 0:
+            continue
+        if number > len(regions):
+            regions, labels = np.zeros((2 * number, SIDES_END)), np.zeros(2 * number, np.int32)
+        for k in range(number):
+            put_cone(regions[k], cones[base + k])
+        of_edge = Regions(regions[:number], labels[:number], 0.0, 0.0)
+        stretches = envelope_along(of_edge, (0.0, 0.0, 1.0, 0.0), lengths[e])
+        counts[e] = len(stretches)
+        rows, ends = (
+            with_room(rows, total + len(stretches)),
+            with_room(ends, total + len(stretches)),
+        )
+        for k in range(len(stretches)):
+            rows[total, 0] = base + int(stretches[k, REGION])
+            ends[total, 0] = lengths[e]
+            if k > 0:
+                place = stretches[k, START]
+                place = crossing_near(cones, rows[total - 1, 0], rows[total, 0], place)
+                before = ends[total - 2, 0] if k > 1 else 0.0
+                ends[total - 1, 0] = min(max(place, before), lengths[e])
+            total += 1
+    return EdgeFunction(counts, rows[:total, 0].copy(), ends[:total, 0].copy())
+
+
+@inlined
+def put_cone(region: Floats, cone: Floats) -> None:
+    """Make ``region`` the disc around the apex of a cone, between lines at right angles."""
+    put_disc(region, cone[FOOT], cone[HEIGHT], -cone[SIGMA])
+    put_side(region, 0, 1.0, 0.0, cone[FOOT] - cone[LOW])
+    put_side(region, 1, -1.0, 0.0, cone[HIGH] - cone[FOOT])
+
+
+@kernel
+def crossing_near(cones: Floats, i: int, j: int, place: float) -> float:
+    """Return the place near another where two cones are equal, if they are; else the latter."""
+    best, least = place, abs(cone_at(cones, i, place) - cone_at(cones, j, place))
+    lo, hi = max(cones[i, LOW], cones[j, LOW]), min(cones[i, HIGH], cones[j, HIGH])
+    for _ in range(_CORRECTIONS):
+        rate = slope_at(cones, i, place) - slope_at(cones, j, place)
+        if rate == 0.0:
+            break
+        place -= (cone_at(cones, i, place) - cone_at(cones, j, place)) / rate
+        if not lo <= place <= hi:
+            break
+        apart = abs(cone_at(cones, i, place) - cone_at(cones, j, place))
+        if not apart < least:
+            break
+        best, least = place, apart
+    return best
+
+
+@inlined
+def cone_at(cones: Floats, i: int, place: float) -> float:
+    """Return the value of a cone."""
+    return cones[i, SIGMA] + math.hypot(place - cones[i, FOOT], cones[i, HEIGHT])
+
+
+@inlined
+def slope_at(cones: Floats, i: int, place: float) -> float:
+    """Return by how much a cone rises; 0 at its apex."""
+    away = math.hypot(place - cones[i, FOOT], cones[i, HEIGHT])
+    return (place - cones[i, FOOT]) / away if away > 0.0 else 0.0
