@@ -209,7 +209,7 @@ class Surface:
         """Return for each vertex the lowest of those joined to it by edges of no length."""
         label = np.arange(self.count)
         tail, head = self.given.ravel(), np.roll(self.given, -1, axis=1).ravel()
-        if lengths is None:
+        if lengths is None and self.vertices is not None:
             joined = (self.vertices[tail] == self.vertices[head]).all(axis=1)
         else:
             joined = np.asarray(lengths).ravel() == 0.0
