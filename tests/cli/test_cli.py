@@ -757,6 +757,9 @@ def test_a_mesh_is_cut_along_lines_of_files(run: Run, plane: Path) -> None:
     with np.load("cut.npz") as arrays:
         for name in ("vertices", "faces", "face_of", "location_faces", "curve_edges", "parts"):
             np.testing.assert_array_equal(arrays[name], getattr(own, name))
+    again = gc.load_mesh("cut.npz")
+    assert again.vertices.tobytes() == own.vertices.tobytes()
+    np.testing.assert_array_equal(again.faces, own.faces)
     assert run("cut", plane, *along, "--out", "cut.ply").code == 0
     np.testing.assert_array_equal(gc.load_mesh("cut.ply").vertices, own.vertices)
     whole = run("cut", plane, *along, "--whole", "--json")
