@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from itertools import count
+from itertools import count as numbers
 from typing import TypeVar
 
 from geodesic_core.errors import (
@@ -18,6 +18,9 @@ SLICE_SECONDS = 0.05
 """About how long a call computes between two checkpoints: what cancelling takes, at most."""
 
 _FIRST_ITEMS = 256
+
+_ROUNDS_SHOWN = 40
+"""Rounds after which what is left of the progress is too little to be shown."""
 
 WATCHED_ITEMS = 100
 """Items that a call prepares between two questions whether it is to stop. The slowest, points of
@@ -75,7 +78,7 @@ class Control:
     bytes_beside: int = 0
     began: float = field(default_factory=time.perf_counter)
     _watched: Iterator[int] = field(
-        default_factory=lambda: count(1), init=False, repr=False, compare=False
+        default_factory=lambda: numbers(1), init=False, repr=False, compare=False
     )
     """Numbers of the items that the call watches, from 1"""
 
@@ -217,6 +220,16 @@ class Control:
         needed += self.bytes_beside
         if self.memory_limit is not None and needed > self.memory_limit:
             raise MemoryLimitExceeded(needed, self.memory_limit)
+
+
+def rounds(control: Control) -> Iterator[Control]:
+    """Yield controls for the rounds of a call whose number is not known.
+
+    Of the progress, each has half of what those before have left.
+    """
+    for i in numbers(1):
+        parts = 2 ** min(i, _ROUNDS_SHOWN)
+        yield control.for_part(parts - 2, parts, count=int(i < _ROUNDS_SHOWN))
 
 
 def in_slices(count: int, work: Callable[[int, int], int], control: Control) -> None:

@@ -1025,7 +1025,14 @@ def mean_point(
     return find_mean(surface, places, shares / shares.sum(), control)
 
 
-def straighten(curve: SurfaceCurve) -> SurfaceCurve:
+def straighten(
+    curve: SurfaceCurve,
+    *,
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> SurfaceCurve:
     """Return a curve pulled tight: the shortest of those into which it can be moved, near it.
 
     Its ends stay. It is straight but for bends at vertices and at the boundary, where neither side
@@ -1035,7 +1042,10 @@ def straighten(curve: SurfaceCurve) -> SurfaceCurve:
     Parameters
     ----------
     curve
-        A path, a straight line, a line of equal value, a border, a boundary or a loop.
+        A path, a straight line, a line of equal value, a border, a boundary, a loop, or any other
+        one, made by `TriangleMesh.curve`.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
 
     Returns
     -------
@@ -1051,6 +1061,8 @@ def straighten(curve: SurfaceCurve) -> SurfaceCurve:
         The curve is closed, and shrinks to a point.
     InvalidArgument
         The curve was resampled, or is a copy without its mesh.
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        The call was stopped.
 
     Notes
     -----
@@ -1063,7 +1075,10 @@ def straighten(curve: SurfaceCurve) -> SurfaceCurve:
     >>> round(bent.length, 6), round(gc.straighten(bent).length, 6)
     (2.0, 1.414214)
     """
-    return straightened_curve(curve, Control())
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    tight = straightened_curve(curve, control)
+    control.checkpoint(1.0)
+    return tight
 
 
 def shortest_loop(
@@ -1121,8 +1136,7 @@ def shortest_loop(
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     surface, control = _surface_of(mesh, barriers, control)
-    quiet = replace(control, progress=None)  # how many sweeps it takes is not known
-    loop = shortest_loop_through(surface, surface.point(through, "through"), quiet)
+    loop = shortest_loop_through(surface, surface.point(through, "through"), control)
     control.checkpoint(1.0)
     return loop
 
@@ -1177,7 +1191,7 @@ def handle_loops(
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     surface, control = _surface_of(mesh, barriers, control)
-    loops = handle_loops_of(surface, replace(control, progress=None))
+    loops = handle_loops_of(surface, control)
     control.checkpoint(1.0)
     return loops
 

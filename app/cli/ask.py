@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from app.cli.barriers import BlockedFaces
 from app.cli.points import (
-    CurvesToCut,
-    CurveToCut,
+    Curves,
     Direction,
     Point,
     PointOrCurve,
     PointOrLabel,
     Position,
+    WrittenCurve,
 )
 from app.cli.steps import Failure, MeshInput, read, showing
 from app.cli.words import say_warning, words_of
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from app.errors import Problem
     from geodesic_core import TriangleMesh
 
-Written = Point | PointOrCurve | CurveToCut | Position | Direction
-Several = PointOrLabel | CurvesToCut
+Written = Point | PointOrCurve | WrittenCurve | Position | Direction
+Several = PointOrLabel | Curves
 """What an option names at once"""
 WrittenMembers = Mapping[str, Written | Sequence[Written] | Sequence[Several]]
 """Points by the member of the request that they become."""
@@ -121,7 +121,7 @@ def _on_mesh(
         if isinstance(each, PointOrLabel):
             found += each.on(mesh)
         else:
-            found += each.curves if isinstance(each, CurvesToCut) else [each]
+            found += each.curves if isinstance(each, Curves) else [each]
     return found
 
 

@@ -73,8 +73,8 @@ class PointOrLabel:
 
 
 @dataclass(frozen=True)
-class CurveToCut:
-    """A curve to cut along: as it was written, or a line of a file."""
+class WrittenCurve:
+    """A curve, as it was written, or a line of a file."""
 
     text: str
     curve: dict[str, Any]
@@ -85,18 +85,18 @@ class CurveToCut:
 
 
 @dataclass(frozen=True)
-class CurvesToCut:
+class Curves:
     """A curve, or all lines of a file."""
 
-    curves: Sequence[CurveToCut]
+    curves: Sequence[WrittenCurve]
 
     @classmethod
-    def parse(cls, text: str) -> "CurvesToCut":
+    def parse(cls, text: str) -> "Curves":
         """Return the curve that an option names, or the lines of ``@FILE``."""
         if text.startswith("@"):
-            return cls([CurveToCut(text, curve) for curve in _lines_in(Path(text[1:]))])
+            return cls([WrittenCurve(text, curve) for curve in _lines_in(Path(text[1:]))])
         points = [point.as_json() for point in PointOrCurve.parse(text).points]
-        return cls([CurveToCut(text, {"polyline": points})])
+        return cls([WrittenCurve(text, {"polyline": points})])
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ def _lines_in(file: Path) -> list[dict[str, Any]]:
     if not curves:
         raise typer.BadParameter(
             f"{file} has no lines with locations: write it by path, paths or trace, or with "
-            "--locations by isolines, borders or boundaries"
+            "--locations by isolines, borders, boundaries, loop or straighten"
         )
     return curves
 

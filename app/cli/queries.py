@@ -39,7 +39,7 @@ from app.cli.arguments import (
 from app.cli.ask import Answered, ask
 from app.cli.barriers import BlockedFaces
 from app.cli.output import AsJson, Output
-from app.cli.points import CurvesToCut, Direction, Point, Position
+from app.cli.points import Curves, Direction, Point, Position
 from app.cli.steps import Failure, MeshInput
 from app.cli.summary import bound_in_words, print_bound, print_end, print_size
 from app.cli.values_file import Values
@@ -123,6 +123,21 @@ _WITH_LOCATIONS: Options = {
             ),
         ],
         False,
+    )
+}
+_ALONG: Options = {
+    "along": (
+        Annotated[
+            list[Curves],
+            typer.Option(
+                parser=Curves.parse,
+                metavar="CURVE|@FILE.json",
+                help="A curve: points separated by /, each in one face with the next, as "
+                "12/e13-14:0.5/15; or the lines of an answer that was written to a file. May be "
+                "repeated.",
+            ),
+        ],
+        _NEEDED,
     )
 }
 _POINTS_OUT = _out("points go, too: .csv or .json; - prints .csv.", ".csv", ".json")
@@ -268,6 +283,14 @@ def _of_mean(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
     yield from _place(found["mean"])
     state = "converged" if found["converged"] else "not converged"
     yield f"variance    {found['variance']!r}, {state} after {found['moves']} moves"
+
+
+def _of_loops(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
+    for line in found["lines"]:
+        name, count = "loop" if line["closed"] else "curve", len(line["faces"])
+        yield f"{name:11} {float(line['length'])!r} long, through {count} faces"
+    if not found["lines"]:
+        yield "loops       none: the surface has no handle"
 
 
 def _of_borders(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
@@ -565,24 +588,39 @@ COMMANDS = {
         _of_mean,
         _weighted,
     ),
+    "loop": Command(
+        "loop",
+        "Find the shortest loop through a point that cannot be shrunk, or two for each handle.",
+        "Looking for loops",
+        {
+            "through": _points(
+                "Where the loop begins and ends; without it, two loops for each handle.",
+                default=None,
+                several=False,
+            ),
+            **_LINES_OUT,
+            **_WITH_LOCATIONS,
+            "barriers": (Barriers, None),
+        },
+        {"through": "through"},
+        _of_loops,
+        _barriers,
+    ),
+    "straighten": Command(
+        "loop",
+        "Pull curves tight: each becomes the shortest near it, open or closed.",
+        "Pulling tight",
+        {**_ALONG, **_LINES_OUT, **_WITH_LOCATIONS, "barriers": (Barriers, None)},
+        {"curves": "along"},
+        _of_loops,
+        _barriers,
+    ),
     "cut": Command(
         "cut",
         "Cut the mesh along curves, so that they are edges and the surface comes apart.",
         "Cutting",
         {
-            "along": (
-                Annotated[
-                    list[CurvesToCut],
-                    typer.Option(
-                        parser=CurvesToCut.parse,
-                        metavar="CURVE|@FILE.json",
-                        help="A curve: points separated by /, each in one face with the next, as "
-                        "12/e13-14:0.5/15; or the lines of an answer that was written to a file. "
-                        "May be repeated.",
-                    ),
-                ],
-                _NEEDED,
-            ),
+            **_ALONG,
             **_out(
                 "cut mesh goes: .ply, or .npz with the arrays that lead back to the old one, too; "
                 ".json tells its sizes.",
@@ -759,7 +797,8 @@ def _run(command: Command, given: dict[str, Any]) -> None:
         members["include"] = ["locations"]
     if "max_distance" in given:
         members |= limits(given["max_distance"], given["barriers"])
-    points = {member: given[option] or [] for member, option in command.points.items()}
+    options = command.points.items()
+    points = {member: given[option] for member, option in options if given[option] is not None}
     if command.kind == "locate":
         points["points"] = [points["points"]]
     mesh = MeshInput(given["mesh_file"], given["file_format"], given["merge"])

@@ -181,6 +181,7 @@ class Worker:
             settings.query_memory_bytes,
             settings.max_json_values,
             settings.max_matrix_cells,
+            settings.max_sources,
         )
 
     def _answer(self, work: RunQuery, clock: "Clock", cancel: Callable[[], bool]) -> TaskResult:

@@ -24,6 +24,7 @@ from app.queries.field_cache import FieldCache, Unwritten
 from app.queries.isolines import IsolinesQuery
 from app.queries.locate import LocateQuery
 from app.queries.log_map import LogMapQuery
+from app.queries.loop import LoopQuery
 from app.queries.matrix import MatrixQuery
 from app.queries.mean import MeanQuery
 from app.queries.nearest import NearestQuery
@@ -48,6 +49,7 @@ KINDS: Mapping[str, type[Query[Any]]] = {
         CellsQuery,
         SamplesQuery,
         MeanQuery,
+        LoopQuery,
         MatrixQuery,
         NearestQuery,
         LogMapQuery,
@@ -70,6 +72,7 @@ __all__ = [
     "IsolinesQuery",
     "LocateQuery",
     "LogMapQuery",
+    "LoopQuery",
     "MatrixQuery",
     "MeanQuery",
     "MeshSize",

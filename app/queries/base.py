@@ -62,6 +62,8 @@ class ExecutionContext:
     """Most values of the answer, where it is written as JSON"""
     max_cells: int = UNLIMITED
     """Most cells of a sparse matrix, whose number is known only once it is computed"""
+    max_points: int = UNLIMITED
+    """Most points that are looked for, where the request does not say how many"""
 
     def part(self, part: int, parts: int) -> "ExecutionContext":
         """Return the context of one of several calls, of about the same length, for one answer."""

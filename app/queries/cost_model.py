@@ -44,6 +44,8 @@ PER_FACE_TRACED = 2e-6
 """For each face that a straight line crosses, about one for each mean edge of its length."""
 SWEEPS_OF_SAMPLES, SWEEPS_OF_ITERATION, SWEEPS_OF_MEAN = 6.0, 1.3, 10.0
 """Of farthest points, in all; of an iteration that relaxes them; of the search for a mean."""
+SWEEPS_OF_LOOPS = 6.0
+"""Of the shortest loop through a point, and of the loops of handles."""
 FACES_ON_LEVEL = 4.0
 """Faces that an isoline crosses, for the √n of n faces: about those of a great circle."""
 

@@ -1,8 +1,7 @@
 """A mesh cut along curves: a new mesh, and the way back to the old one."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -10,11 +9,10 @@ from numpy.typing import NDArray
 
 import geodesic_core as gc
 from app.encoding import JSON, Answer, Surface
-from app.errors import Fault, pointer
 from app.queries.base import ExecutionContext, Query
 from app.queries.cost_model import PER_FACE_STORED, PER_POINT
-from app.queries.points import SurfacePoints, numbered, to_point_or_curve
-from app.queries.validation import FAULTS_SHOWN, WrittenPoints, invalid_points, naming
+from app.queries.points import SurfacePoints, points_in_curves, split_points, to_curves
+from app.queries.validation import FAULTS_SHOWN, WrittenPoints, naming
 from app.schemas.requests import CutRequest
 from app.store.meshes import CUT_ARRAYS, OpenMesh, content_hash
 
@@ -31,10 +29,7 @@ class CutQuery(Query[CutRequest]):
 
     def written_points(self) -> WrittenPoints:
         """Yield the points of all curves."""
-        return chain.from_iterable(
-            numbered(pointer("curves", i, "polyline"), curve.polyline)
-            for i, curve in enumerate(self.request.curves)
-        )
+        return points_in_curves(self.request.curves)
 
     def rough_seconds(self) -> float:
         """Return the cost of the points, and of a new mesh."""
@@ -69,8 +64,8 @@ class CutQuery(Query[CutRequest]):
     def _cut(
         self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext
     ) -> tuple[gc.CutMesh, dict[str, Any]]:
-        given = list(self._split(points))
-        curves = [self._curve(opened.mesh, i, own) for i, own in enumerate(given)]
+        given = split_points(self.request.curves, points)
+        curves = to_curves(opened.mesh, self.request.curves, given)
         with naming((gc.errors.InvalidMesh, "/curves")):
             cut = gc.cut(opened.mesh, curves, self.request.separate, **context.options)
         about = self.members(
@@ -81,25 +76,6 @@ class CutQuery(Query[CutRequest]):
             snapped=_snapped(given),
         )
         return cut, about
-
-    def _split(self, points: SurfacePoints) -> Iterator[SurfacePoints]:
-        """Yield the points of each curve."""
-        rest = iter(points)
-        for curve in self.request.curves:
-            yield [next(rest) for _ in curve.polyline]
-
-    def _curve(self, mesh: gc.TriangleMesh, number: int, points: SurfacePoints) -> gc.Curve:
-        """Return a curve for the library; a closed one ends where it begins."""
-        written = self.request.curves[number]
-        place = pointer("curves", number)
-        curve = to_point_or_curve(mesh, place, written, points)
-        assert isinstance(curve, gc.Curve), "that is what was written"  # noqa: S101
-        if not written.closed:
-            return curve
-        if not gc.share_a_face(mesh, points[-1], points[0]):
-            message = "the last point shares no face with the first, so that no segment joins them"
-            raise invalid_points([Fault(f"{place}/closed", message)])
-        return gc.Curve((*points, points[0]))
 
 
 def arrays_of(cut: gc.CutMesh) -> Mapping[str, NDArray[Any]]:

@@ -18,6 +18,7 @@ from app.schemas.points import (
     PointOrCurve,
     PositionPoint,
     Source,
+    SurfaceCurve,
     VertexPoint,
 )
 
@@ -47,6 +48,13 @@ def points_in_sources(sources: Sequence[Source]) -> WrittenPoints:
     """Yield the points of sources, each with its pointer."""
     return chain.from_iterable(
         points_in(f"/sources/{i}", source) for i, source in enumerate(sources)
+    )
+
+
+def points_in_curves(curves: Sequence[SurfaceCurve]) -> WrittenPoints:
+    """Yield the points of curves, each with its pointer."""
+    return chain.from_iterable(
+        numbered(f"/curves/{i}/polyline", curve.polyline) for i, curve in enumerate(curves)
     )
 
 
@@ -154,6 +162,12 @@ def to_point_or_curve(
     """
     if not isinstance(written, Curve):
         return points[0]
+    _check_gaps(mesh, pointer, points)
+    return gc.Curve(tuple(points))
+
+
+def _check_gaps(mesh: gc.TriangleMesh, pointer: str, points: SurfacePoints) -> None:
+    """Refuse a curve with a piece that lies in no face."""
     faults = (
         Fault(f"{pointer}/polyline/{i}", _GAP)
         for i, (start, end) in enumerate(pairwise(points), 1)
@@ -162,7 +176,34 @@ def to_point_or_curve(
     shown = tuple(islice(faults, FAULTS_SHOWN))
     if shown:
         raise invalid_points(shown)
-    return gc.Curve(tuple(points))
+
+
+def split_points(curves: Sequence[SurfaceCurve], points: SurfacePoints) -> Sequence[SurfacePoints]:
+    """Return the resolved points of each curve."""
+    rest = iter(points)
+    return [[next(rest) for _ in curve.polyline] for curve in curves]
+
+
+def to_curves(
+    mesh: gc.TriangleMesh, curves: Sequence[SurfaceCurve], points: Sequence[SurfacePoints]
+) -> list[gc.SurfaceCurve]:
+    """Return curves for the library, from the resolved points of each.
+
+    Raises
+    ------
+    ProblemError
+        A piece of a curve lies in no face.
+    """
+    found = []
+    for i, (curve, own) in enumerate(zip(curves, points, strict=True)):
+        place = f"/curves/{i}"
+        _check_gaps(mesh, place, own)
+        if curve.closed and not gc.share_a_face(mesh, own[-1], own[0]):
+            message = "the last point shares no face with the first, so that no segment joins them"
+            raise invalid_points([Fault(f"{place}/closed", message)])
+        with naming((gc.errors.InvalidPoint, f"{place}/polyline")):
+            found.append(mesh.curve(own, curve.closed))
+    return found
 
 
 def to_sources(

@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 
 import geodesic_core as gc
 from app.encoding import CSV, JSON, NPY, OCTETS, Answer, Indices
-from app.errors import Fault, problem
+from app.errors import Fault, over_limit, problem
 from app.queries.base import VALUES_OF_POINT, ExecutionContext, Query
 from app.queries.cost_model import (
     PER_POINT,
     PER_SWEEP,
     SWEEPS_OF_ITERATION,
     SWEEPS_OF_SAMPLES,
+    share_reached,
     sweep_seconds,
 )
 from app.queries.points import SurfacePoints, describe_point, numbered
@@ -70,18 +71,35 @@ class SamplesQuery(Query[SamplesRequest]):
 
     def rough_seconds(self) -> float:
         """Return the cost of all sweeps."""
-        count = self.request.count or self.size.vertices
+        count = self._likely_count
         sweeps = min(SWEEPS_OF_SAMPLES, count) + SWEEPS_OF_ITERATION * self.request.iterations
         sweep = sweep_seconds(self.size.faces, Accuracy(), 1.0)
         return sweeps * sweep + count * (PER_SWEEP + PER_POINT)
+
+    @property
+    def _likely_count(self) -> float:
+        """The number of points, about: discs of the radius cover the surface."""
+        request = self.request
+        count = float(min(request.count or self.size.vertices, self.size.vertices))
+        if request.radius is None:
+            return count
+        share = share_reached(self.size, 1, request.radius)
+        return min(count, 1.0 / share) if share > 0.0 else count
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Add points one by one, then move them."""
         request, mesh = self.request, opened.mesh
         parts = 2 if request.iterations else 1
+        most = context.max_points
+        count = request.count or most + 1  # one too many tells that there would be more
         with naming((gc.errors.InvalidArgument, "/count")):
             spread = gc.farthest_points(
-                mesh, request.count, request.radius, points, **context.part(0, parts).options
+                mesh, count, request.radius, points, **context.part(0, parts).options
+            )
+        if len(spread) > most:
+            hint = "ask for a larger radius, or for a count"
+            raise over_limit(
+                "limit_exceeded", "points", len(spread), most, "max_sources", hint=hint
             )
         found, distances, nearest = spread.points, spread.distances, spread.nearest
         moved: dict[str, Any] = {"costs": [], "converged": None}

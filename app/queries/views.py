@@ -107,6 +107,22 @@ def lines_of_boundaries(curves: Sequence[Mapping[str, Any]], *, located: bool) -
     return lines
 
 
+def lines_of_loops(loops: Sequence[Mapping[str, Any]], *, located: bool) -> list[Line]:
+    """Return loops and straightened curves as lines, or a line without points for none."""
+    return [
+        polyline(
+            loop,
+            {
+                "line": i if loops else None,
+                "closed": loop["closed"],
+                "length": loop["length"],
+            },
+            f"line_{i}",
+        )
+        for i, loop in enumerate(loops or [_no_line(located=located)])
+    ]
+
+
 def table_of_matrix(distances: NDArray[np.float64]) -> Table:
     """Return a row for each cell of a matrix (N, M), or for each of N pairs."""
     if distances.ndim == 1:

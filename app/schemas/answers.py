@@ -240,6 +240,18 @@ class MeanAnswer(BaseModel):
     warnings: list[str]
 
 
+class LoopAnswer(BaseModel):
+    """Loops that cannot be shrunk to a point, or curves pulled tight."""
+
+    kind: Literal["loop"]
+    mesh_id: str
+    lines: list[LineDocument] = Field(
+        description="The loop, which begins at its point; or the curves, in their order, open or "
+        "closed as they were; or two loops for each handle, the shortest first"
+    )
+    warnings: list[str]
+
+
 class BoundaryDocument(LineDocument):
     """A polyline of boundary edges, with the surface on its left."""
 

@@ -164,8 +164,8 @@ class Curve(StrictModel):
     )
 
 
-class CurveToCut(Curve):
-    """A curve that a surface is cut along."""
+class SurfaceCurve(Curve):
+    """A curve on the surface, open or closed."""
 
     closed: StrictBool = Field(
         default=False,

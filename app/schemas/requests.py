@@ -18,7 +18,6 @@ from app.schemas.points import (
     MOST_MEMBERS,
     Axis,
     Count,
-    CurveToCut,
     Directions,
     Ends,
     FailFastList,
@@ -29,6 +28,7 @@ from app.schemas.points import (
     Positive,
     Source,
     StrictModel,
+    SurfaceCurve,
     Triple,
 )
 
@@ -290,6 +290,31 @@ class MeanRequest(AmongBarriers):
     )
 
 
+class LoopRequest(AskingForLines):
+    """The shortest loop ``through`` a point, ``curves`` pulled tight, or the loops of handles."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {"through": {"vertex": 0}},
+                {"curves": [{"polyline": [0, 1, 3], "closed": True}]},
+                {},
+            ]
+        }
+    )
+
+    through: Point | None = Field(
+        default=None, description="The point that the loop begins at, and returns to"
+    )
+    curves: FailFastList[SurfaceCurve] | None = Field(
+        default=None,
+        min_length=1,
+        description="Curves to pull tight: each becomes the shortest near it, with its ends where "
+        "they are. The `locations` of lines in answers are such points. With neither of the two, "
+        "two loops are looked for at each handle",
+    )
+
+
 class CutRequest(QueryBody):
     """A surface that is cut along ``curves``, which become edges of a new mesh."""
 
@@ -306,7 +331,7 @@ class CutRequest(QueryBody):
         }
     )
 
-    curves: FailFastList[CurveToCut] = Field(
+    curves: FailFastList[SurfaceCurve] = Field(
         min_length=1,
         description="At least one. They may cross, touch and overlap, end anywhere, pass through "
         "vertices and run along edges; one of a single point makes that a vertex",

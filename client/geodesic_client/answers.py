@@ -166,6 +166,20 @@ class Boundary:
 
 
 @dataclass(frozen=True)
+class Loop:
+    """A loop that cannot be shrunk to a point, or a curve pulled tight."""
+
+    points: Floats
+    faces: Integers
+    closed: bool
+    """False for an open curve that was pulled tight"""
+    length: float
+    locations: Sequence[Mapping[str, Any]] = ()
+    """Its points, each as a face and the weights of its corners: where they were asked for, and on
+    a mesh without positions"""
+
+
+@dataclass(frozen=True)
 class Matrix:
     """Distances between many points; infinite where they cannot be reached.
 
@@ -298,8 +312,8 @@ class StraightLine:
     """Radians at the last point; NaN where directions have no meaning"""
 
 
-SurfaceLine = Path | Isoline | Border | Boundary | StraightLine
-"""A line that a mesh can be cut along, where it has its locations"""
+SurfaceLine = Path | Isoline | Border | Boundary | Loop | StraightLine
+"""A line that can be a curve of a request, where it has its locations"""
 
 
 @dataclass(frozen=True)
@@ -443,6 +457,11 @@ def to_boundaries(response: httpx2.Response) -> list[Boundary]:
         Boundary(np.array(line["vertices"], np.int64), **_members_of(line))
         for line in response.json()["boundaries"]
     ]
+
+
+def to_loops(response: httpx2.Response) -> list[Loop]:
+    """Return loops, or curves pulled tight."""
+    return [Loop(**_members_of(line)) for line in response.json()["lines"]]
 
 
 def to_cut(response: httpx2.Response) -> Cut:

@@ -28,6 +28,7 @@ from geodesic_client.answers import (
     ListedMesh,
     LocatedPoint,
     LogMap,
+    Loop,
     Matrix,
     Mean,
     Mesh,
@@ -50,6 +51,7 @@ from geodesic_client.answers import (
     to_listed_mesh,
     to_located,
     to_log_map,
+    to_loops,
     to_matrix,
     to_mean,
     to_mesh,
@@ -87,6 +89,7 @@ Kind = Literal[
     "samples",
     "cells",
     "mean",
+    "loop",
     "matrix",
     "nearest",
     "log-map",
@@ -364,6 +367,38 @@ def boundaries(
     return (yield from _ask(mesh, "boundaries", body, to_boundaries, progress))
 
 
+def loops(
+    mesh: Mesh | str,
+    through: Point | None = None,
+    *,
+    barriers: Sequence[int] = (),
+    include: Sequence[Literal["locations"]] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[list[Loop]]:
+    """Return the shortest loop through a point that cannot be shrunk to a point.
+
+    Without a point, return two loops for each handle of the surface, the shortest first.
+    """
+    body = _body(through=through, barriers=barriers, include=include)
+    return (yield from _ask(mesh, "loop", body, to_loops, progress))
+
+
+def straighten(
+    mesh: Mesh | str,
+    curves: SurfaceLine | Sequence[SurfaceLine | Sequence[Point]],
+    *,
+    barriers: Sequence[int] = (),
+    include: Sequence[Literal["locations"]] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[list[Loop]]:
+    """Return curves pulled tight, in their order: each the shortest near it, with the same ends.
+
+    Curves are given as for `cut`. Lines of answers that are closed stay closed.
+    """
+    body = _body(curves=_as_curves(curves), barriers=barriers, include=include)
+    return (yield from _ask(mesh, "loop", body, to_loops, progress))
+
+
 def cut(
     mesh: Mesh | str,
     curves: SurfaceLine | Sequence[SurfaceLine | Sequence[Point]],
@@ -379,9 +414,14 @@ def cut(
     arrays that lead back to the old mesh: ``face_of``, ``location_faces``, ``location_weights``,
     ``curve_edges``, ``edge_curves``, ``copy_of`` and ``parts``.
     """
-    given = [curves] if isinstance(curves, SurfaceLine) else curves
-    body = _body(curves=list(map(_as_curve, given)), separate=separate, name=name)
+    body = _body(curves=_as_curves(curves), separate=separate, name=name)
     return (yield from _ask(mesh, "cut", body, to_cut, progress))
+
+
+def _as_curves(
+    curves: SurfaceLine | Sequence[SurfaceLine | Sequence[Point]],
+) -> list[dict[str, Any]]:
+    return list(map(_as_curve, [curves] if isinstance(curves, SurfaceLine) else curves))
 
 
 def _as_curve(curve: SurfaceLine | Sequence[Point]) -> dict[str, Any]:
@@ -765,6 +805,8 @@ class Operations:
     samples = Method(samples)
     cells = Method(cells)
     mean = Method(mean)
+    loops = Method(loops)
+    straighten = Method(straighten)
     log_map = Method(log_map)
     trace = Method(trace)
     locate = Method(locate)

@@ -219,6 +219,29 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/meshes/{mesh_id}/loop": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Loops that cannot be shrunk to a point, and curves pulled tight
+         * @description Return the shortest loop `through` a point, of all that do not shrink to a point; or `curves` pulled tight;
+         *     or, with neither, two loops for each handle of the surface.
+         *
+         *     Where every loop shrinks to a point, or a closed curve does, the request is refused.
+         */
+        post: operations["findLoops"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/meshes/{mesh_id}/cut": {
         parameters: {
             query?: never;
@@ -379,7 +402,7 @@ export interface paths {
          *     A surface may be given by the lengths of its edges: as JSON with `faces` and `lengths`, or as an
          *     `.npz` file of these arrays, in both with `vertices` or without. Without, all that lies on the
          *     surface is answered, with `null` in place of positions; what needs space is refused as
-         *     `not_embedded`.
+         *     `not_embedded`. An `.npz` file of `vertices` and `faces` is a mesh like any other.
          */
         post: operations["createMesh"];
         delete?: never;
@@ -1003,30 +1026,6 @@ export interface components {
             polyline: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[];
         };
         /**
-         * CurveToCut
-         * @description A curve that a surface is cut along.
-         */
-        CurveToCut: {
-            /**
-             * Polyline
-             * @description Points, each in one face with the next; the `locations` of a path are such points
-             * @example [
-             *       {
-             *         "vertex": 0
-             *       },
-             *       {
-             *         "vertex": 1
-             *       }
-             *     ]
-             */
-            polyline: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[];
-            /**
-             * Closed
-             * @description Whether the curve leads from its last point back to the first, which is not repeated: as `closed` of lines in answers. Default: `false`
-             */
-            closed?: boolean;
-        };
-        /**
          * CutAnswer
          * @description A mesh of which curves are edges, and which is in the store like any other.
          *
@@ -1105,7 +1104,7 @@ export interface components {
              * Curves
              * @description At least one. They may cross, touch and overlap, end anywhere, pass through vertices and run along edges; one of a single point makes that a vertex
              */
-            curves: components["schemas"]["CurveToCut"][];
+            curves: components["schemas"]["SurfaceCurve"][];
             /**
              * Separate
              * @description Whether the surface comes apart along the curves. Default: `true`
@@ -1665,6 +1664,41 @@ export interface components {
             next_cursor?: string | null;
         };
         /**
+         * LineDocument
+         * @description A polyline on the surface.
+         */
+        LineDocument: {
+            /**
+             * Closed
+             * @description Whether the line leads from its last point back to the first, which is not repeated
+             */
+            closed: boolean;
+            /**
+             * Length
+             * @description The length in mesh units
+             */
+            length: number;
+            /**
+             * Points
+             * @description Null on a mesh that is given by the lengths of its edges alone
+             */
+            points: [
+                number,
+                number,
+                number
+            ][] | null;
+            /**
+             * Faces
+             * @description The face of each segment
+             */
+            faces: number[];
+            /**
+             * Locations
+             * @description The points again, on the surface: if included, and on a mesh without positions
+             */
+            locations?: components["schemas"]["Location"][] | null;
+        };
+        /**
          * ListedMesh
          * @description A mesh in a list; its own address has the whole report.
          */
@@ -1877,6 +1911,74 @@ export interface components {
              * @description Vertices farther than this, in mesh units, count as unreachable
              */
             max_distance?: number | null;
+        };
+        /**
+         * LoopAnswer
+         * @description Loops that cannot be shrunk to a point, or curves pulled tight.
+         */
+        LoopAnswer: {
+            /**
+             * Kind
+             * @constant
+             */
+            kind: "loop";
+            /** Mesh Id */
+            mesh_id: string;
+            /**
+             * Lines
+             * @description The loop, which begins at its point; or the curves, in their order, open or closed as they were; or two loops for each handle, the shortest first
+             */
+            lines: components["schemas"]["LineDocument"][];
+            /** Warnings */
+            warnings: string[];
+        };
+        /**
+         * LoopRequest
+         * @description The shortest loop ``through`` a point, ``curves`` pulled tight, or the loops of handles.
+         * @example {
+         *       "through": {
+         *         "vertex": 0
+         *       }
+         *     }
+         * @example {
+         *       "curves": [
+         *         {
+         *           "closed": true,
+         *           "polyline": [
+         *             0,
+         *             1,
+         *             3
+         *           ]
+         *         }
+         *       ]
+         *     }
+         * @example {}
+         */
+        LoopRequest: {
+            /**
+             * Barriers
+             * @description Indices of blocked faces. They act as holes, and paths may bend at their corners. Default: `[]`
+             * @example [
+             *       7,
+             *       8
+             *     ]
+             */
+            barriers?: number[];
+            /**
+             * Include
+             * @description `locations`: also the points of lines as faces and weights. On a mesh without positions they come in any case. Default: `[]`
+             */
+            include?: "locations"[];
+            /**
+             * Through
+             * @description The point that the loop begins at, and returns to
+             */
+            through?: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"]) | null;
+            /**
+             * Curves
+             * @description Curves to pull tight: each becomes the shortest near it, with its ends where they are. The `locations` of lines in answers are such points. With neither of the two, two loops are looked for at each handle
+             */
+            curves?: components["schemas"]["SurfaceCurve"][] | null;
         };
         /**
          * MatrixAnswer
@@ -3059,6 +3161,30 @@ export interface components {
              * @description The face of each segment
              */
             faces: number[];
+        };
+        /**
+         * SurfaceCurve
+         * @description A curve on the surface, open or closed.
+         */
+        SurfaceCurve: {
+            /**
+             * Polyline
+             * @description Points, each in one face with the next; the `locations` of a path are such points
+             * @example [
+             *       {
+             *         "vertex": 0
+             *       },
+             *       {
+             *         "vertex": 1
+             *       }
+             *     ]
+             */
+            polyline: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[];
+            /**
+             * Closed
+             * @description Whether the curve leads from its last point back to the first, which is not repeated: as `closed` of lines in answers. Default: `false`
+             */
+            closed?: boolean;
         };
         /**
          * TraceAnswer
@@ -4508,6 +4634,119 @@ export interface operations {
                 };
                 content: {
                     "application/json": string;
+                };
+            };
+            /** @description malformed_body, idempotency_key_unused, malformed_request */
+            400: components["responses"]["Problem"];
+            /** @description unauthorized */
+            401: components["responses"]["Unauthorized"];
+            /** @description origin_not_allowed */
+            403: components["responses"]["Problem"];
+            /** @description mesh_not_found */
+            404: components["responses"]["Problem"];
+            /** @description not_acceptable */
+            406: components["responses"]["Problem"];
+            /** @description upload_too_large, result_too_large */
+            413: components["responses"]["Problem"];
+            /** @description unsupported_media_type */
+            415: components["responses"]["Problem"];
+            /** @description range_not_satisfiable */
+            416: components["responses"]["Problem"];
+            /** @description host_not_allowed */
+            421: components["responses"]["Problem"];
+            /** @description invalid_point, not_embedded, invalid_request, limit_exceeded, memory_limit */
+            422: components["responses"]["Problem"];
+            /** @description quota_exceeded, rate_limited */
+            429: components["responses"]["ProblemForNow"];
+            /** @description header_too_large */
+            431: components["responses"]["Problem"];
+            /** @description worker_died, mesh_damaged, internal_error */
+            500: components["responses"]["Problem"];
+            /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
+            503: components["responses"]["ProblemForNow"];
+            /** @description deadline_exceeded */
+            504: components["responses"]["Problem"];
+            /** @description storage_full, quota_exceeded */
+            507: components["responses"]["Problem"];
+        };
+    };
+    findLoops: {
+        parameters: {
+            query?: {
+                /** @description Overrides `Accept` */
+                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv";
+                /** @description Type of the numbers in `npy`, `npz` and `octets` */
+                dtype?: "float64" | "float32";
+            };
+            header?: {
+                /** @description The longest time that the client waits, in milliseconds; it bounds no job */
+                "x-timeout-ms"?: number;
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
+                prefer?: string;
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job. With `Prefer: respond-async` only */
+                "idempotency-key"?: string;
+                /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
+                Range?: string;
+            };
+            path: {
+                mesh_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["LoopRequest"];
+            };
+        };
+        responses: {
+            /** @description The lines, closed and open. In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` names what is too long for one */
+            200: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LoopAnswer"];
+                    "model/obj": string;
+                    "text/csv": string;
+                };
+            };
+            /** @description With `Prefer: respond-async`: the job */
+            202: {
+                headers: {
+                    Location: components["headers"]["Location"];
+                    "Preference-Applied": components["headers"]["Preference-Applied"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobDocument"];
+                };
+            };
+            /** @description The requested range */
+            206: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Content-Range": components["headers"]["Content-Range"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": string;
+                    "model/obj": string;
+                    "text/csv": string;
                 };
             };
             /** @description malformed_body, idempotency_key_unused, malformed_request */

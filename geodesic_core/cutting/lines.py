@@ -8,9 +8,9 @@ import numpy as np
 from geodesic_core.arrays import Floats, Longs
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument, InvalidPoint
-from geodesic_core.mesh.curve import polyline_of, weights_by_face
+from geodesic_core.mesh.curve import polyline_of, shared_face
 from geodesic_core.mesh.surface_curve import SurfaceCurve
-from geodesic_core.mesh.surface_point import Curve, SurfacePoint
+from geodesic_core.mesh.surface_point import Curve
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
 
@@ -65,7 +65,7 @@ def _line_of(mesh: TriangleMesh, curve: object, name: str, control: Control) -> 
         )
     if isinstance(curve, Curve):
         points = polyline_of(mesh, curve, name, control)
-        between = [_shared_face(mesh, *ends) for ends in control.watched(pairwise(points))]
+        between = [shared_face(mesh, *ends) for ends in control.watched(pairwise(points))]
         return Line(
             np.array([point.face_index for point in points], np.int64),
             np.array([point.barycentric for point in points]),
@@ -77,10 +77,3 @@ def _line_of(mesh: TriangleMesh, curve: object, name: str, control: Control) -> 
 
 def _has_faces_of(mesh: TriangleMesh, other: TriangleMesh) -> bool:
     return mesh is other or np.array_equal(mesh.faces, other.faces)
-
-
-def _shared_face(mesh: TriangleMesh, start: SurfacePoint, end: SurfacePoint) -> int:
-    if start == end:
-        return start.face_index
-    shared = weights_by_face(mesh, start).keys() & weights_by_face(mesh, end)
-    return int(mesh.topology.outer_face[list(shared)].min())

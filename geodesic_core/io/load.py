@@ -77,7 +77,8 @@ def load_mesh(
     rest, and morph targets count by their default weights. An STL file has no numbering: its equal
     corners are always merged, in order of first appearance, and
     ``mesh.vertex_map[3 * face + corner]`` is the vertex. An NPZ file holds the arrays of
-    `TriangleMesh.from_lengths`: ``faces``, ``lengths`` and, where it is to be drawn, ``vertices``.
+    `TriangleMesh`, ``vertices`` and ``faces``, or those of `TriangleMesh.from_lengths`: ``faces``,
+    ``lengths`` and, where it is to be drawn, ``vertices``. Others that it holds are not read.
 
     Parameters
     ----------

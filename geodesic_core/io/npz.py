@@ -1,4 +1,4 @@
-"""Surfaces given by the lengths of their edges: NumPy's archives of arrays."""
+"""Surfaces in NumPy's archives of arrays, which may be given by the lengths of their edges."""
 
 import io
 import math
@@ -15,16 +15,16 @@ from geodesic_core.mesh.validation import as_faces, as_vertices
 
 
 def read_npz(data: bytes, max_faces: int | None) -> FileContents:
-    """Read the arrays ``faces``, ``lengths`` and, if it is there, ``vertices``; of ``np.savez``."""
+    """Read the arrays ``faces`` and ``vertices``, ``lengths`` or both; of ``np.savez``."""
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         names = [name.removesuffix(".npy") for name in archive.namelist()]
-        if not {"faces", "lengths"} <= set(names):
+        if "faces" not in names or not {"vertices", "lengths"} & set(names):
             raise InvalidMesh(
-                f"the NPZ file has the arrays {', '.join(names[:5])}; it must have faces and "
-                "lengths, and may have vertices"
+                f"the NPZ file has the arrays {', '.join(names[:5])}; it must have faces, and "
+                "vertices, lengths or both"
             )
         faces = as_faces(_array(archive, "faces", max_faces))
-        lengths = _array(archive, "lengths", max_faces)
+        lengths = _array(archive, "lengths", max_faces) if "lengths" in names else None
         vertices = np.empty((0, 3))
         if "vertices" in names:
             vertices = as_vertices(_array(archive, "vertices", None))

@@ -13,9 +13,8 @@ from geodesic_core.arrays import Longs
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidMesh
 from geodesic_core.kernels.mesh.half_edges import FANS, LENGTH, OPPOSITE, SEAM, TAIL
-from geodesic_core.loops.straighten import curve_through
 from geodesic_core.mesh.edge_lengths import weights_in_faces
-from geodesic_core.mesh.surface_curve import SurfaceCurve
+from geodesic_core.mesh.surface_curve import SurfaceCurve, curve_through
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 

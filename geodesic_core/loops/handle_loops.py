@@ -10,7 +10,7 @@ along edges). Pulling them tight does not change their kinds.
 import numpy as np
 
 from geodesic_core.arrays import Ints, Longs
-from geodesic_core.control import Control
+from geodesic_core.control import Control, rounds
 from geodesic_core.fields.distance_field import solve
 from geodesic_core.fields.question import Question
 from geodesic_core.fields.sweeps import ExactSweep
@@ -38,13 +38,14 @@ def handle_loops_of(mesh: TriangleMesh, control: Control) -> list[SurfaceCurve]:
     on_faces = np.unique(topology.outer_vertex[topology.links[:, TAIL]])
     parts, first = np.unique(topology.component[on_faces], return_index=True)
     roots = on_faces[first].astype(np.int64)
-    best = _loops_through(mesh, roots, control) if len(roots) else []
+    each_round = rounds(control)
+    best = _loops_through(mesh, roots, next(each_round)) if len(roots) else []
     while best:
         # A loop that is tight has sunk to where its handle is thin: from there others are shorter
         vertices = best[-1].located.vertices
         root = vertices[vertices >= 0][0]
         roots[parts == topology.component[root]] = root
-        loops = _loops_through(mesh, roots, control)
+        loops = _loops_through(mesh, roots, next(each_round))
         if _total(loops) >= _total(best) * (1.0 - SHORTER):
             break
         best = loops
@@ -62,7 +63,7 @@ def _loops_through(mesh: TriangleMesh, roots: Longs, control: Control) -> list[S
     inner = np.flatnonzero(opposite > np.arange(len(links)))
     rim = np.flatnonzero(opposite == NO_FACE)
     question = Question.of(mesh, roots.tolist(), [], np.inf, control)
-    field = solve(ExactSweep(question), "distances", control)
+    field = solve(ExactSweep(question), "distances", control.for_part(0, 2))
     distances = field.distances[mesh.topology.outer_vertex]
     edges = np.concatenate([inner, rim])
     far = distances[links[edges, TAIL]] + distances[links[edges, HEAD]]
@@ -78,7 +79,11 @@ def _loops_through(mesh: TriangleMesh, roots: Longs, control: Control) -> list[S
     parts = mesh.topology.component[mesh.topology.outer_vertex[links[::3, TAIL]]]
     first_faces = np.unique(parts, return_index=True)[1].tolist()
     up = half_edges_up(tree, tree // 3, opposite[tree] // 3, first_faces)
-    loops = [loop_of(mesh, _cycle(links, up, h), control) for h in edges_left[~in_tree].tolist()]
+    crossed = edges_left[~in_tree].tolist()
+    loops = [
+        loop_of(mesh, _cycle(links, up, h), control.for_part(len(crossed) + i, 2 * len(crossed)))
+        for i, h in enumerate(crossed)
+    ]
     return sorted(loops, key=lambda loop: loop.length)
 
 

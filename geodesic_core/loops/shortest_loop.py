@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats, Longs
-from geodesic_core.control import Control
+from geodesic_core.control import Control, rounds
 from geodesic_core.errors import NoLoop
 from geodesic_core.fields.distance_field import DistanceField, solve
 from geodesic_core.fields.question import Question
@@ -55,10 +55,10 @@ class _LoopSearch:
     """A search for the shortest loop through a point."""
 
     def __init__(self, mesh: TriangleMesh, point: SurfacePoint, control: Control) -> None:
-        self._mesh, self._point, self._control = mesh, point, control
+        self._mesh, self._point, self._parts = mesh, point, rounds(control)
         topology = mesh.topology
         links, lengths = topology.links, topology.geometry[:, LENGTH]
-        field = _swept(mesh, point, [], np.inf, control)
+        field = _swept(mesh, point, [], np.inf, next(self._parts))
         distances = field.distances[topology.outer_vertex]
         ways = distances[links[:, TAIL]] + distances[links[:, HEAD]]
         self._lengths = lengths
@@ -80,14 +80,15 @@ class _LoopSearch:
         """Return a cover, the distances on it, and the sheet to which the loop leads."""
         self._add_around([0])
         while True:
-            cover = self._cover()
+            control = next(self._parts)
+            cover = self._cover(control)
             sheets = range(1, len(self._kinds.words))
             targets = [cover.lifted(self._point, sheet) for sheet in sheets]
             # What is within the limit on an edge is near both of its ends
             limit = self._limit * (1.0 + SEARCH_SLACK)
             start, reach = cover.lifted(self._point, 0), limit + float(self._lengths.max())
-            control = self._control.holding(cover.mesh.nbytes)
-            field = _swept(cover.mesh, start, targets, reach, control)
+            beside = control.holding(cover.mesh.nbytes)
+            field = _swept(cover.mesh, start, targets, reach, beside)
             lengths = [field.distance_at(target) for target in targets]
             is_found = min(lengths) <= limit
             if min(lengths) < np.inf:
@@ -105,7 +106,7 @@ class _LoopSearch:
             for word in self.graph.words:
                 self._kinds.number(self._kinds.words[sheet] + word)
 
-    def _cover(self) -> Cover:
+    def _cover(self, control: Control) -> Cover:
         """Return the cover of the sheets so far: of the faces that a loop within the limit meets.
 
         A point of the loop is no farther than half of its length.
@@ -117,7 +118,7 @@ class _LoopSearch:
         reach = 0.5 * self._limit * (1.0 + SEARCH_SLACK)
         kept: NDArray[np.bool_] = np.any(self._nearest.reshape(-1, 3) <= reach, axis=1)
         kept[self._mesh.inner_face[self._point.face_index]] = True
-        return cover_of(self._mesh, self._across[:, self._words_out], kept, self._control)
+        return cover_of(self._mesh, self._across[:, self._words_out], kept, control)
 
     def _missing(self, cover: Cover, field: DistanceField) -> Longs:
         """Return the sheets that a loop within the limit may leave for one that is missing."""

@@ -7,20 +7,26 @@ that centre, the loop passes the vertex that is farthest from it.
 """
 
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints, Longs
-from geodesic_core.control import Control
+from geodesic_core.control import Control, rounds
 from geodesic_core.errors import InternalError, NoLoop
 from geodesic_core.kernels.mesh.half_edges import HEAD, OPPOSITE, TAIL
-from geodesic_core.kernels.mesh.locations import drop_repeats
 from geodesic_core.kernels.paths import funnel
 from geodesic_core.kernels.paths.funnel import LEFT, NEITHER, RIGHT, String, Strip
-from geodesic_core.mesh.surface_curve import SurfaceCurve, length_on, located_in, rows_of
+from geodesic_core.mesh.surface_curve import SurfaceCurve, curve_through
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.tolerances import MOST_PASSES, SHORTER, TAUT
+from geodesic_core.tolerances import MOST_PASSES, SHORTER, STALLS, TAUT
+
+_BYTES_OF_SEGMENT = 128
+"""Memory that each face takes which a curve crosses: its segment, its portal, where it unfolds."""
+
+_SLICE_CROSSINGS = 2**18
+"""Crossings of edges that are passed between two checkpoints, some 50 ms."""
 
 
 class _Line(NamedTuple):
@@ -72,25 +78,31 @@ def straightened_curve(curve: SurfaceCurve, control: Control) -> SurfaceCurve:
         The curve has no mesh, or was resampled.
     NoLoop
         It is closed and shrinks to a point.
-    Cancelled, DeadlineExceeded
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As the control says.
     """
+    control.check_memory(_BYTES_OF_SEGMENT * len(curve.faces))
     pieces = None
-    while pieces is None or pieces > 1:
+    for part in rounds(control):
+        part.checkpoint(0.0)
         mesh, starts, ends = curve._segments()
         line = _Line(curve._inner_faces, starts, ends)
         if len(line.faces) == 0:
             break
         first = line.first_break(mesh) if curve.closed else 0
         if first is None:
-            return straight_loop(mesh, line.strips(mesh)[0], control)
+            return straight_loop(mesh, line.strips(mesh)[0], part)
         strips = line.turned(first).strips(mesh)
         if pieces is not None and len(strips) >= pieces:
             break
         # Where a piece between two sheets has shrunk to nothing, those beside it may be one
         pieces = len(strips)
-        pulled = [_straightened(mesh, strip) for strip in strips]
+        pulled = [
+            _straightened(mesh, strip, part.for_part(i, pieces)) for i, strip in enumerate(strips)
+        ]
         curve = curve_in(mesh, pulled, closed=curve.closed)
+        if pieces == 1:
+            break
     if curve.closed and len(curve.faces) == 0:
         raise _shrunk()
     return curve
@@ -107,9 +119,8 @@ def straight_loop(mesh: TriangleMesh, strip: Strip, control: Control) -> Surface
     Each round but the last makes it shorter, by more than SHORTER of its length.
     """
     length, best = np.inf, None
-    for _ in range(MOST_PASSES):
-        control.checkpoint(0.0)
-        strip, string = _straightened(mesh, strip)
+    for part in islice(rounds(control), MOST_PASSES):
+        strip, string = _straightened(mesh, strip, part)
         if len(strip.portals) == 0:
             raise _shrunk()
         if best is not None and string.length >= length * (1.0 - SHORTER):
@@ -122,12 +133,18 @@ def straight_loop(mesh: TriangleMesh, strip: Strip, control: Control) -> Surface
     raise _endless()
 
 
-def _straightened(mesh: TriangleMesh, strip: Strip) -> tuple[Strip, String]:
-    passes = MOST_PASSES + len(mesh.faces)
-    strip, string, is_done = funnel.straightened(mesh.topology, strip, TAUT, 0.0, passes)
-    if not is_done:
-        raise _endless()
-    return strip, string
+def _straightened(mesh: TriangleMesh, strip: Strip, control: Control) -> tuple[Strip, String]:
+    """Return a strip whose string is straight, and the string; asks before each slice of passes."""
+    most, parts = MOST_PASSES + len(mesh.faces), rounds(control)
+    while most > 0:
+        next(parts).checkpoint(0.0)
+        # A slice is longer than passes may be that gain nothing
+        passes = STALLS + 2 + _SLICE_CROSSINGS // max(len(strip.portals), 1)
+        strip, string, is_done = funnel.straightened(mesh.topology, strip, TAUT, 0.0, passes)
+        if is_done:
+            return strip, string
+        most -= passes
+    raise _endless()
 
 
 def _shrunk() -> NoLoop:
@@ -214,23 +231,6 @@ def curve_in(
     parts = [funnel.points_of(strip, string) for strip, string in strips]
     faces, weights = (np.concatenate(rows) for rows in zip(*parts, strict=True))
     return curve_through(mesh, faces, weights, faces[:-1], closed=closed)
-
-
-def curve_through(
-    mesh: TriangleMesh, faces: Longs, weights: Floats, between: Longs, *, closed: bool
-) -> SurfaceCurve:
-    """Return the curve through points of inner faces; a closed one ends where it begins.
-
-    ``between`` holds the inner faces of its segments. Points that repeat are left out.
-    """
-    located = located_in(mesh, faces, weights)
-    outer = np.empty(len(between), np.int32)
-    crossed = between[::-1].astype(np.int32)
-    count = drop_repeats(mesh.topology.outer_face, crossed, located, outer)
-    located = rows_of(located, slice(0, count - 1 if closed and count > 1 else count))
-    outer = outer[: count - 1]
-    length = length_on(mesh, located, outer, closed)
-    return SurfaceCurve(mesh, outer, closed, length, located)
 
 
 def portals_along(*curves: SurfaceCurve, closed: bool) -> Ints:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain, pairwise
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +11,12 @@ from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument, InvalidPoint
 from geodesic_core.kernels.mesh.half_edges import APEX, TAIL
 from geodesic_core.mesh.canonical import half_edges_around
-from geodesic_core.mesh.edge_lengths import flat_points
+from geodesic_core.mesh.edge_lengths import flat_points, weights_in_faces
+from geodesic_core.mesh.surface_curve import SurfaceCurve, curve_through
 from geodesic_core.mesh.surface_point import Curve, Point, SurfacePoint, Weights
-from geodesic_core.mesh.triangle_mesh import TriangleMesh
+
+if TYPE_CHECKING:  # which makes curves
+    from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
 Polyline = tuple[SurfacePoint, ...]
 """The canonical points of a curve; of a point, itself alone."""
@@ -32,7 +35,7 @@ class SegmentInFace(NamedTuple):
     """Weights of its end there"""
 
 
-def polyline_of(mesh: TriangleMesh, curve: Curve, name: str, control: Control) -> Polyline:
+def polyline_of(mesh: "TriangleMesh", curve: Curve, name: str, control: Control) -> Polyline:
     """Return the canonical points of a curve; ``name`` is how messages call it.
 
     Raises
@@ -63,7 +66,7 @@ def polyline_of(mesh: TriangleMesh, curve: Curve, name: str, control: Control) -
     return points
 
 
-def share_a_face(mesh: TriangleMesh, start: Point, end: Point) -> bool:
+def share_a_face(mesh: "TriangleMesh", start: Point, end: Point) -> bool:
     """Tell whether two points have a face in common, as neighbours on a `Curve` must.
 
     Parameters
@@ -95,14 +98,49 @@ def share_a_face(mesh: TriangleMesh, start: Point, end: Point) -> bool:
     return _share_a_face(mesh, mesh.point(start, "start"), mesh.point(end, "end"))
 
 
-def _share_a_face(mesh: TriangleMesh, start: SurfacePoint, end: SurfacePoint) -> bool:
+def _share_a_face(mesh: "TriangleMesh", start: SurfacePoint, end: SurfacePoint) -> bool:
     """Tell the same of canonical points."""
     if start == end:
         return True
     return bool(weights_by_face(mesh, start).keys() & weights_by_face(mesh, end))
 
 
-def segments_of(mesh: TriangleMesh, polyline: Iterable[SurfacePoint]) -> list[list[SegmentInFace]]:
+def shared_face(mesh: "TriangleMesh", start: SurfacePoint, end: SurfacePoint) -> int:
+    """Return the lowest face that two canonical points have in common."""
+    if start == end:
+        return start.face_index
+    shared = weights_by_face(mesh, start).keys() & weights_by_face(mesh, end)
+    return int(mesh.topology.outer_face[list(shared)].min())
+
+
+def curve_on(mesh: "TriangleMesh", points: Sequence[Point], *, closed: bool) -> SurfaceCurve:
+    """Return the curve through some points.
+
+    Raises
+    ------
+    InvalidArgument
+        There are no points.
+    InvalidPoint
+        One is not a point of the mesh or lies in blocked faces only, or two share no face.
+    """
+    stops = polyline_of(mesh, Curve(points), "the curve", Control())
+    if closed and not _share_a_face(mesh, stops[-1], stops[0]):
+        raise InvalidPoint(f"no face holds the last point, {stops[-1]}, and the first, {stops[0]}")
+    stops = (*stops, stops[0]) if closed else stops
+    faces = np.array([point.face_index for point in stops], np.int32)
+    weights = np.array([point.barycentric for point in stops])
+    between = np.array([shared_face(mesh, *ends) for ends in pairwise(stops)], np.int64)
+    inner = np.where(faces >= 0, mesh.inner_face[faces], -1).astype(np.int64)
+    if (inner < 0).any():
+        raise InvalidPoint(f"{stops[int(inner.argmin())]} is in no face that is free")
+    weights = weights_in_faces(mesh.topology, mesh.faces, faces, weights, inner)
+    inner_between = mesh.inner_face[between].astype(np.int64)
+    return curve_through(mesh, inner, weights, inner_between, closed=closed)
+
+
+def segments_of(
+    mesh: "TriangleMesh", polyline: Iterable[SurfacePoint]
+) -> list[list[SegmentInFace]]:
     """Return the segments of a polyline, each in all faces that hold it.
 
     Segments of no length are left out.
@@ -118,7 +156,7 @@ def segments_of(mesh: TriangleMesh, polyline: Iterable[SurfacePoint]) -> list[li
     return segments
 
 
-def weights_by_face(mesh: TriangleMesh, point: SurfacePoint) -> dict[int, Weights]:
+def weights_by_face(mesh: "TriangleMesh", point: SurfacePoint) -> dict[int, Weights]:
     """Return each inner face that a canonical point belongs to, with its weights there."""
     topology = mesh.topology
     if point.vertex_index is not None:
@@ -139,7 +177,7 @@ def weights_by_face(mesh: TriangleMesh, point: SurfacePoint) -> dict[int, Weight
     return {g // 3: weights_in(g // 3) for g in half_edges_around(topology.links, h)}
 
 
-def length_in_face(mesh: TriangleMesh, start: SurfacePoint, end: SurfacePoint) -> float:
+def length_in_face(mesh: "TriangleMesh", start: SurfacePoint, end: SurfacePoint) -> float:
     """Return the distance of two canonical points in one face, within it, mesh units."""
     if mesh.lengths is None:
         return float(
@@ -151,7 +189,7 @@ def length_in_face(mesh: TriangleMesh, start: SurfacePoint, end: SurfacePoint) -
 
 
 def foot_on(
-    mesh: TriangleMesh, segment: SegmentInFace, inner_face: int, point: SurfacePoint
+    mesh: "TriangleMesh", segment: SegmentInFace, inner_face: int, point: SurfacePoint
 ) -> SurfacePoint:
     """Return the canonical point of a segment that is nearest to a point of an inner face.
 

@@ -16,7 +16,7 @@ from geodesic_core.errors import InvalidArgument, NotEmbedded
 from geodesic_core.kernels.curves.chains import Lines
 from geodesic_core.kernels.curves.line_points import locate_lines
 from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL
-from geodesic_core.kernels.mesh.locations import Locations, locate_points
+from geodesic_core.kernels.mesh.locations import Locations, drop_repeats, locate_points
 from geodesic_core.mesh.curve_file import CurveRecord, write_curve_file
 from geodesic_core.mesh.edge_lengths import flat_points, weights_in_faces
 from geodesic_core.mesh.surface_point import Curve, Point, Points, Source, SurfacePoint
@@ -369,6 +369,23 @@ def curves_of(mesh: "TriangleMesh", lines: Lines) -> list[SurfaceCurve]:
             curve = SurfaceCurve(mesh, between, bool(closed), length, part)
             curves.append(curve if runs_as_wound(mesh, int(inner_faces[lo])) else curve.reversed())
     return curves
+
+
+def curve_through(
+    mesh: "TriangleMesh", faces: Longs, weights: Floats, between: Longs, *, closed: bool
+) -> SurfaceCurve:
+    """Return the curve through points of inner faces; a closed one ends where it begins.
+
+    ``between`` holds the inner faces of its segments. Points that repeat are left out.
+    """
+    located = located_in(mesh, faces, weights)
+    outer = np.empty(len(between), np.int32)
+    crossed = between[::-1].astype(np.int32)
+    count = drop_repeats(mesh.topology.outer_face, crossed, located, outer)
+    located = rows_of(located, slice(0, count - 1 if closed and count > 1 else count))
+    outer = outer[: count - 1]
+    length = length_on(mesh, located, outer, closed)
+    return SurfaceCurve(mesh, outer, closed, length, located)
 
 
 def runs_as_wound(mesh: "TriangleMesh", inner_face: int) -> bool:

@@ -25,6 +25,7 @@ from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.mesh import canonical
 from geodesic_core.mesh.boundaries import boundaries_of
 from geodesic_core.mesh.closest_point import NearestFace
+from geodesic_core.mesh.curve import curve_on
 from geodesic_core.mesh.degeneracies import (
     edges_of_no_length,
     lowest_joined,
@@ -948,6 +949,36 @@ class TriangleMesh:
         (True, 4.0, [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
         """
         return boundaries_of(self)
+
+    def curve(self, points: Sequence[Point], closed: bool = False) -> SurfaceCurve:
+        """Return the curve through some points of the surface.
+
+        Parameters
+        ----------
+        points
+            One or more vertex indices or `SurfacePoint`, each in one face with the next.
+        closed
+            Whether it leads from the last point back to the first, which shares a face with it.
+
+        Returns
+        -------
+        SurfaceCurve
+            Straight from each point to the next. Points that repeat are left out.
+
+        Raises
+        ------
+        InvalidArgument
+            There are no points.
+        InvalidPoint
+            One is not a point of this mesh, or shares no free face with the next.
+
+        Examples
+        --------
+        >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
+        >>> mesh.curve([0, 1, 3], closed=True).length == 2.0 + 2.0**0.5
+        True
+        """
+        return curve_on(self, points, closed=closed)
 
     def tangent_frames(self) -> TangentFrames:
         """Return a tangent plane at each vertex, in which angles on the surface become vectors.

@@ -665,6 +665,50 @@ def test_cells_and_means_are_the_library_s(run: Run, plane: Path) -> None:
     assert answer["mean"]["position"] == mesh.position(mean.point).tolist()
 
 
+def test_loops_are_the_library_s(run: Run) -> None:
+    assert run("sample", "knot", "--faces", 2000, "knot.ply").code == 0
+    mesh = gc.load_mesh("knot.ply")
+    ran = run("loop", "knot.ply", "--out", "loops.json", "--locations")
+    assert (ran.code, ran.err) == (0, "")
+    loops = gc.handle_loops(mesh)
+    for loop in loops:
+        assert f"loop        {loop.length!r} long, through {len(loop.faces)} faces" in ran.out
+    assert run("loop", "knot.ply", "--through", 7, "--out", "loop.csv").code == 0
+    own = gc.shortest_loop(mesh, 7)
+    assert [[float(row[x]) for x in "xyz"] for row in rows_of("loop.csv")] == own.points.tolist()
+    along = "--along", "@loops.json", "--along", "/".join(map(str, mesh.faces[9]))
+    ran = run("straighten", "knot.ply", *along, "--out", "tight.json")
+    lines = json.loads(Path("tight.json").read_text())["lines"]
+    given = [
+        *(mesh.curve(loop.locations, closed=True) for loop in loops),
+        mesh.curve(mesh.faces[9]),
+    ]
+    for line, curve in zip(lines, map(gc.straighten, given), strict=True):
+        assert (line["closed"], line["length"]) == (curve.closed, curve.length)
+        assert line["points"] == curve.points.tolist()
+    assert ran.figure("curve") == f"{lines[2]['length']!r} long, through 1 faces"
+    assert run("sample", "sphere", "--faces", 320, "ball.ply").code == 0
+    assert run("loop", "ball.ply").figure("loops") == "none: the surface has no handle"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("loop --through 60", "--through 60: every loop on this part of the surface shrinks"),
+        ("loop --through 999", "--through 999: vertex 999 does not exist"),
+        ("straighten --along 0/60", "--along 0/60: shares no face with the point before it"),
+        ("straighten --along @ring.json", "--along @ring.json: the curve shrinks to a point"),
+    ],
+)
+def test_loops_that_are_none(run: Run, plane: Path, arguments: str, message: str) -> None:
+    ring = "isolines", plane, "--source", 60, "--level", 0.3, "--locations", "--out", "ring.json"
+    assert run(*ring).code == 0
+    command, *rest = arguments.split()
+    ran = run(command, plane, *rest)
+    assert ran.code != 0
+    assert message in error_line(ran)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -757,6 +801,9 @@ def test_a_mesh_is_cut_along_lines_of_files(run: Run, plane: Path) -> None:
     with np.load("cut.npz") as arrays:
         for name in ("vertices", "faces", "face_of", "location_faces", "curve_edges", "parts"):
             np.testing.assert_array_equal(arrays[name], getattr(own, name))
+    again = gc.load_mesh("cut.npz")
+    assert again.vertices.tobytes() == own.vertices.tobytes()
+    np.testing.assert_array_equal(again.faces, own.faces)
     assert run("cut", plane, *along, "--out", "cut.ply").code == 0
     np.testing.assert_array_equal(gc.load_mesh("cut.ply").vertices, own.vertices)
     whole = run("cut", plane, *along, "--whole", "--json")

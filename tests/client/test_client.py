@@ -233,6 +233,31 @@ def test_samples_cells_and_means_are_the_library_s(
     )
 
 
+def test_loops_are_the_library_s(service: Client, mesh: Mesh, same: gc.TriangleMesh) -> None:
+    (loop,) = service.loops(mesh, 7, include=["locations"])
+    handles = service.loops(mesh)
+    way = service.path(mesh, 0, 900, waypoints=[500])
+    tight = service.straighten(mesh, [way, loop, [0, 1]])
+    (alone,) = service.straighten(mesh, way)
+    own = [
+        gc.shortest_loop(same, 7),
+        *gc.handle_loops(same),
+        *(
+            gc.straighten(same.curve(curve.locations, closed=curve.closed))
+            for curve in (gc.shortest_path(same, 0, 900, [500]), gc.shortest_loop(same, 7))
+        ),
+    ]
+    for found, expected in zip([loop, *handles, *tight], own, strict=False):
+        assert (found.closed, found.length) == (expected.closed, expected.length)
+        np.testing.assert_array_equal(found.points, expected.points)
+        np.testing.assert_array_equal(found.faces, expected.faces)
+    assert len(own) == 5
+    assert alone.length == tight[0].length
+    assert len(loop.locations) == len(loop.points)
+    with pytest.raises(ValueError, match="has no locations"):
+        service.straighten(mesh, handles)
+
+
 def test_points_of_a_surface_that_lies_nowhere(service: Client) -> None:
     archive = BytesIO()
     np.savez(archive, faces=[[0, 1, 2], [0, 2, 3]], lengths=np.ones((2, 3)))

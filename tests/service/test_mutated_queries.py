@@ -93,6 +93,10 @@ MORE_SEEDS: Mapping[str, tuple[Any, ...]] = {
         },
     ),
     "findMean": ({"points": [0, {"face": 0, "barycentric": [0.2, 0.3, 0.5]}], "weights": [1, 2]},),
+    "findLoops": (
+        {"through": {"edge": [0, 1], "t": 0.5}, "barriers": [7], "include": ["locations"]},
+        {"curves": [{"polyline": [0, {"vertex": 1}], "closed": True}]},
+    ),
     "cutMesh": (
         {
             "curves": [

@@ -28,6 +28,7 @@ QUERIES: dict[str, dict[str, Any]] = {
     "samples": {"count": 4, "starts": [INSIDE], "iterations": 1},
     "cells": {"sources": [INSIDE, {"vertex": 9}]},
     "mean": {"points": [INSIDE, {"vertex": 9}]},
+    "loop": {"curves": [{"polyline": [INSIDE]}]},
     "matrix": {"sources": [VERTEX, INSIDE], "targets": [{"vertex": 9}]},
     "nearest": {"source": INSIDE, "candidates": [{"vertex": 9}, VERTEX], "k": 2},
     "log_map": {"source": INSIDE, "x_axis": [1, 0, 0]},

@@ -196,18 +196,24 @@ def test_the_deadline_and_the_memory_hold(client: TestClient, tmp_path: Path, li
 
 
 def test_what_is_too_many(tmp_path: Path) -> None:
-    with serving(tmp_path, max_sources=5, max_json_values=100) as client:
+    with serving(tmp_path / "few", max_sources=5) as client:
         mesh_id = upload_sample(client, "plane", 1000)
         six = list(range(6))
         refused: list[tuple[str, dict[str, Any]]] = [
             ("samples", {"count": 6}),
             ("samples", {"count": 2, "starts": six}),
+            ("samples", {"radius": 0.1}),
             ("cells", {"sources": six}),
             ("mean", {"points": six}),
         ]
         for link, body in refused:
             problem = check_problem(ask(client, mesh_id, link, **body), 422, "limit_exceeded")
             assert (problem["actual"], problem["limit"]) == (6, 5)
+        five = gc.farthest_points(stored_mesh(client, mesh_id), 5)
+        found = ask(client, mesh_id, "samples", radius=five.radius[-1]).json()
+        assert len(found["points"]) == 5
+    with serving(tmp_path / "short", max_json_values=100) as client:
+        mesh_id = upload_sample(client, "plane", 1000)
         after, before = {"radius": 0.1}, {"count": 2, "include": ["distances"]}  # it is found
         check_problem(ask(client, mesh_id, "samples", **after), 413, "result_too_large")
         check_problem(ask(client, mesh_id, "samples", **before), 413, "result_too_large")

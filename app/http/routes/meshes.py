@@ -130,7 +130,7 @@ async def create_mesh(
     A surface may be given by the lengths of its edges: as JSON with `faces` and `lengths`, or as an
     `.npz` file of these arrays, in both with `vertices` or without. Without, all that lies on the
     surface is answered, with `null` in place of positions; what needs space is refused as
-    `not_embedded`.
+    `not_embedded`. An `.npz` file of `vertices` and `faces` is a mesh like any other.
     """
     refuse_idempotency_key(request)
     with service.uploads.counting(context.caller):

@@ -159,6 +159,18 @@ OPERATIONS = (
         "The point, and whether no other near it is better",
     ),
     Operation(
+        "/loop",
+        queries.LoopQuery,
+        answers.LoopAnswer,
+        "findLoops",
+        "Loops that cannot be shrunk to a point, and curves pulled tight",
+        "Return the shortest loop `through` a point, of all that do not shrink to a point; or "
+        "`curves` pulled tight;\nor, with neither, two loops for each handle of the surface.\n\n"
+        "Where every loop shrinks to a point, or a closed curve does, the request is refused.",
+        "The lines, closed and open",
+        _LINES,
+    ),
+    Operation(
         "/cut",
         queries.CutQuery,
         answers.CutAnswer,

@@ -39,6 +39,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "samples": {"count": 3, "radius": 9, "starts": POINTS, "iterations": 2, "barriers": [5]},
     "cells": LINES,
     "mean": {"points": POINTS, "weights": [1, 0.5], "barriers": [5]},
+    "loop": {"through": POINTS[3], "curves": [{"polyline": POINTS}], "barriers": [5]},
     "matrix": {"sources": POINTS, "targets": POINTS, "effort": 1, **ACCURACY, **LIMITS},
     "nearest": {"source": 1, "candidates": POINTS, "k": 2, **LIMITS},
     "log_map": {"source": POINTS[3], "x_axis": [1, 0.5, 0], **LIMITS},
@@ -83,7 +84,9 @@ def test_numbers_in_quotes_are_refused(kind: str) -> None:
     assert accepted == []
 
 
-@pytest.mark.parametrize("kind", sorted(KINDS.keys() - {"boundaries", "cut", "samples", "mean"}))
+@pytest.mark.parametrize(
+    "kind", sorted(KINDS.keys() - {"boundaries", "cut", "loop", "samples", "mean"})
+)
 def test_integers_are_numbers_as_well(kind: str) -> None:
     body = read_body(kind, BODIES[kind])
     (given,) = BODIES[kind]["lengths"] if kind == "trace" else [BODIES[kind]["max_distance"]]

@@ -31,6 +31,7 @@ QUESTIONS: list[tuple[str, dict[str, Any], list[str]]] = [
     ("borders", {"sources": [NEAR, FAR]}, ["Source 1"]),
     ("samples", {"count": 3, "starts": [NEAR, FAR]}, ["Start 1"]),
     ("cells", {"sources": [NEAR, FAR]}, ["Source 1"]),
+    ("loop", {"curves": [{"polyline": [NEAR]}, {"polyline": [24, FAR]}]}, ["Point 1 of curve 1"]),
     ("nearest", {"source": 0, "candidates": [NEAR, FAR]}, ["Candidate 1"]),
     ("log_map", {"source": FAR, "x_axis": 3}, ["The source"]),
     ("trace", {"starts": [NEAR, FAR], "directions": [0.1], "lengths": [0.1]}, ["Start 1"]),

@@ -206,8 +206,22 @@ def test_an_archive_of_arrays_is_read(with_vertices, save, tmp_path):
     with pytest.raises(gc.errors.FileTooLarge):
         gc.load_mesh(path, max_bytes=100)
     np.savez(path, faces=mesh.faces)
-    with pytest.raises(InvalidMesh, match="must have faces and lengths"):
+    with pytest.raises(InvalidMesh, match="must have faces, and vertices, lengths or both"):
         gc.load_mesh(path)
+
+
+def test_an_archive_of_vertices_and_faces_is_read(tmp_path):
+    mesh = gc.samples.plane(200)
+    path = tmp_path / "plane.npz"
+    np.savez(path, vertices=mesh.vertices, faces=mesh.faces, parts=np.arange(3))
+    read = gc.load_mesh(path)
+    assert read.lengths is None
+    assert read.vertices.tobytes() == mesh.vertices.tobytes()
+    np.testing.assert_array_equal(read.faces, mesh.faces)
+    np.savez(
+        path, vertices=mesh.vertices[mesh.faces.reshape(-1)], faces=np.arange(600).reshape(-1, 3)
+    )
+    assert len(gc.load_mesh(path, merge="exact").vertices) == len(mesh.vertices)
 
 
 @pytest.mark.parametrize("name", ["faces", "lengths", "vertices"])

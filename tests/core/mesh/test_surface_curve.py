@@ -198,3 +198,44 @@ def test_the_rim_of_barriers_is_a_boundary() -> None:
     mesh = gc.samples.sphere(80).with_barriers([3])
     (rim,) = mesh.boundaries()
     assert sorted(point.vertex_index for point in rim.locations) == sorted(mesh.faces[3].tolist())
+
+
+def test_a_curve_through_points_is_that_of_their_curve():
+    mesh = gc.samples.knot(2000)
+    loop = gc.shortest_loop(mesh, 7)
+    path = gc.shortest_path(mesh, 0, gc.SurfacePoint.face(700, (0.2, 0.3, 0.5)))
+    for curve in (loop, path, loop.reversed()):
+        again = mesh.curve(curve.locations, closed=curve.closed)
+        assert again.closed == curve.closed
+        assert again.length == pytest.approx(curve.length, rel=1e-12)
+        assert again.locations == tuple(map(mesh.point, curve.locations))
+        assert gc.straighten(again).length == pytest.approx(gc.straighten(curve).length, rel=1e-12)
+
+
+def test_curves_leave_out_points_that_repeat():
+    mesh = gc.samples.plane(2)
+    curve = mesh.curve([0, 0, 1, 1, 3])
+    assert [point.vertex_index for point in curve.locations] == [0, 1, 3]
+    assert mesh.curve([2]).length == 0.0
+    ring = mesh.curve([0, 1, 3, 0], closed=True)
+    assert [point.vertex_index for point in ring.locations] == [0, 1, 3]
+    assert ring.length == 2.0 + 2.0**0.5
+
+
+@pytest.mark.parametrize(
+    ("points", "closed", "message"),
+    [
+        ([], False, "without points"),
+        ([0, 120], False, "no face in common"),
+        ([0, 1, 2], True, "no face holds the last point"),
+        ([0, 10**6], False, "point 1 of the curve"),
+        ([60], False, "in no face that is free"),
+        ([60, 60], False, "in no face that is free"),
+        ([60, 61], False, "no face in common"),
+    ],
+)
+def test_what_is_no_curve(points, closed, message):
+    mesh = gc.samples.plane(200)
+    walled = mesh.with_barriers(np.flatnonzero((mesh.faces == 60).any(axis=1)))
+    with pytest.raises(gc.errors.GeodesicError, match=message):
+        walled.curve(points, closed)
