@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 from xdist.remote import Producer
 from xdist.scheduler import LoadFileScheduling
 
@@ -63,7 +63,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     for name, count in EXAMPLES.items():
         settings.register_profile(
-            name, derandomize=True, max_examples=count, deadline=None, database=None
+            name,
+            derandomize=True,
+            max_examples=count,
+            deadline=None,
+            database=None,
+            suppress_health_check=[HealthCheck.too_slow],  # it counts seconds
         )
     profile = "quick" if config.option.quick else "slice"
     if WITHOUT_JIT:

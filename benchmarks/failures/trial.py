@@ -28,7 +28,7 @@ SETTINGS = {
     # Few answers are known already: most are computed.
     "GEODESIC_RESULTS_BYTES": str(4 * MIB),
     "GEODESIC_RESULTS_MEMORY_BYTES": "1",
-    "GEODESIC_DEADLINE_S": "60",
+    "GEODESIC_DEADLINE_S": str(LONG_S),
 }
 WORKERS = 4
 """Of two nodes: one for long work, and one for small work only"""

@@ -50,7 +50,8 @@ def read_vtk(data: bytes, max_faces: int | None) -> FileContents:
     stream = io.BytesIO(answered)
     answer = json.loads(stream.readline())
     if "error" in answer:
-        raise InvalidMesh(f"the VTK file cannot be read: {answer['error']}")
+        what = answer["error"][:200]  # which may hold any part of the file
+        raise InvalidMesh(f"the VTK file cannot be read: {what}")
     points, corners, sizes = (np.load(stream) for _ in range(3))
     read = FileContents(points, corners, sizes, answer["left_out"])
     if len(sizes) == 0:

@@ -22,7 +22,7 @@ from tests.support.waiting import wait_until
 pytest.importorskip("ray")
 pytestmark = pytest.mark.full
 
-FACES = 1_000_000
+FACES = 200_000
 CHUNK = 2**23
 """Bytes that are pulled at once"""
 LONG = {**NPY, "Accept-Encoding": "identity"}

@@ -41,15 +41,19 @@ def line_points(mesh, line):
 
 
 def check_locations(mesh, line):
-    """Locations give the points, and each segment's face has both of its ends, to the bit."""
+    """Locations give the points, and each segment's face has both of its ends, to the bit.
+
+    Vertices are one where an edge of no length joins them: an edge may have several names.
+    """
     positions = [mesh.position(point) for point in line.locations]
     size = np.abs(mesh.vertices - mesh.vertices[0]).max()
     np.testing.assert_allclose(line.points, positions, rtol=0.0, atol=1e-11 * size)
     ends = [*line.locations, *line.locations[: int(line.closed)]]
+    vertices = mesh.topology.inner_vertex[mesh.faces]
     for face, *segment in zip(line.faces.tolist(), ends[:-1], ends[1:], strict=True):
-        corners = set(mesh.faces[face].tolist())
+        corners = set(vertices[face].tolist())
         for point in segment:
-            near = mesh.faces[point.face_index][np.array(point.barycentric) > 0.0]
+            near = vertices[point.face_index][np.array(point.barycentric) > 0.0]
             assert point.face_index == face or set(near.tolist()) <= corners
 
 
@@ -63,12 +67,16 @@ def check_points(mesh, sources, level, lines, most=60):
 
 
 def check_pieces(mesh, line):
-    """Each piece lies in its face, and has a length."""
+    """Each piece lies in its face, and has a length, unless it crosses a face without width."""
     points = np.vstack([line.points, line.points[:1]]) if line.closed else line.points
     assert len(line.faces) == len(points) - 1
-    assert (np.linalg.norm(np.diff(points, axis=0), axis=1) > 0.0).all()
     corners = mesh.vertices[mesh.faces[line.faces]]
     size = np.abs(corners - corners[:, :1]).max(axis=(1, 2))
+    has_length = np.linalg.norm(np.diff(points, axis=0), axis=1) > 0.0
+    width = np.linalg.svd(corners - corners[:, :1], compute_uv=False)[:, 1]
+    assert (has_length | (width < 1e-15 * size)).all()
+    for i in np.flatnonzero(~has_length).tolist():  # from one of its edges to another
+        assert line.locations[i] != line.locations[(i + 1) % len(line.points)]
     for ends in (points[:-1], points[1:]):
         weights = weights_in(corners, ends)
         weights /= weights.sum(axis=1, keepdims=True)

@@ -53,6 +53,7 @@ class Store:
         self.mesh_id = mesh_id
         self.database = Database(root / "jobs.sqlite3")
         self._told = root.with_suffix(".told")
+        self._left_running: set[tuple[str, int]] = set()
 
     def tell(self, job_id: str, what: str) -> None:
         """Note what a client was told of a job, or what it asked."""
@@ -80,6 +81,7 @@ class Store:
 
         Jobs that are run again may begin before this yields.
         """
+        self._left_running = self.running()
         service = Service(Settings(store=self.root))
         wait = before_work or self.until_running_is_recorded
         engine = DirectEngine(new_worker(self.root), wait)
@@ -88,8 +90,15 @@ class Store:
             yield service, engine
 
     async def until_running_is_recorded(self) -> None:
-        while not any(job.status == "running" for job in read_jobs(self.database)):
+        """Wait until a job runs, and until those that a killed service left are accepted again."""
+        while not (running := self.running()) or running & self._left_running:
             await asyncio.sleep(0)
+
+    def running(self) -> set[tuple[str, int]]:
+        """Return the jobs that are recorded as running, each with its version."""
+        return {
+            (job.id, job.version) for job in read_jobs(self.database) if job.status == "running"
+        }
 
     def query(self, media_type: str) -> DistancesQuery:
         query = DistancesQuery.ask(self.mesh_id, SIZE, DistancesRequest(sources=[{"vertex": 3}]))

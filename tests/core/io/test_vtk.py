@@ -434,6 +434,16 @@ def test_the_time_of_a_read_is_limited_by_the_clock(
         gc.load_mesh(b"# vtk DataFile Version 3.0\n", "vtk")
 
 
+def test_a_refusal_does_not_repeat_the_file(tmp_path: Path) -> None:
+    content = xml(DATA_SETS["UnstructuredGrid"][0], XML["ascii"], tmp_path / "mesh.vtu")
+    content = content.replace(b"Float64", b"Float6" + b"/" * 2000, 1)
+    with pytest.raises(
+        InvalidMesh, match=r"cannot be read: Unknown data type .Float6/+$"
+    ) as caught:
+        gc.load_mesh(content, "vtu")
+    assert len(str(caught.value)) < 400
+
+
 def test_an_error_that_is_no_text_counts() -> None:
     head = b"# vtk DataFile Version 3.0\nby hand\n\xb5\xffASCII\nDATASET POLYDATA\n"
     with pytest.raises(ValueError, match="its text is damaged"):

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 import geodesic_core as gc
@@ -36,7 +36,8 @@ from geodesic_core.kernels.curves.crossings import (
 )
 from geodesic_core.kernels.curves.joining import join, put_crossings, room_for_ends
 from geodesic_core.kernels.curves.line_points import locate_lines
-from geodesic_core.kernels.curves.regions import put_disc
+from geodesic_core.kernels.curves.regions import SIDES_END, put_band, put_disc
+from geodesic_core.kernels.isolines.arcs import is_apart
 from geodesic_core.kernels.mesh.half_edges import HEAD, LENGTH, OPPOSITE, TAIL
 from tests.conftest import WITHOUT_JIT
 
@@ -85,6 +86,32 @@ def test_no_point_of_an_arc_strays_farther_than_its_sagitta(gx, width):
     assert strayed <= sagitta * (1 + 1e-12)
     if gx == 0.0 and width < math.pi:
         assert strayed == pytest.approx(sagitta, rel=1e-12)
+
+
+@given(NUMBERS, NUMBERS, ANGLES, st.floats(0.1, 2.0), ANGLES, st.floats(0.1, 3.0), st.booleans())
+@example(0.0, -3.0, 0.0, 1.0, 0.0, 1.0, True)
+@example(0.0, 0.0, -math.pi / 4, 2.0, -math.pi / 4 - 0.3, 0.6, True)  # into the band
+@example(1.4, -1.4, -math.pi / 4, 2.0, 3 * math.pi / 4 - 0.3, 0.6, True)  # out of it
+def test_an_arc_that_is_surely_apart_has_no_point_in_the_region(
+    x, y, turn, size, start, width, is_band
+):
+    """An arc of a circle around (x, y), of radius 1; a band from (0, 0) along a ray, or a disc."""
+    arc, region = circle(x, y, 1.0), np.zeros(SIDES_END)
+    ex, ey = math.cos(turn), math.sin(turn)
+    if is_band:
+        put_band(region, 0.0, 0.0, ex, ey, size)
+    else:
+        put_disc(region, 0.0, 0.0, size)
+    px, py = np.array([point_on(arc, start + t * width) for t in np.linspace(0.0, 1.0, 51)]).T
+    along, depth = ex * px + ey * py, ex * py - ey * px
+    if is_band:
+        is_within = (depth > 1e-9) & (along > 1e-9) & (along < size - 1e-9)
+    else:
+        is_within = np.hypot(px, py) < size - 1e-9
+    is_surely_apart = is_apart(chord_of(arc, start, start + width), 0.5 * width, region, 0.0)
+    assert not (is_surely_apart and is_within.any())
+    if is_band and depth.max() < -1.0 - width:
+        assert is_surely_apart
 
 
 def test_what_is_hidden_leaves_the_rest():

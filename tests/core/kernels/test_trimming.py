@@ -74,7 +74,9 @@ def test_nothing_nearest_is_lost(p, c):
     assert (found[asked] <= wanted[asked] * (1 + 1e-12) + ALONG_THE_LINE).all()
 
 
-@settings(suppress_health_check=[HealthCheck.filter_too_much])  # few overlap still
+@settings(  # few overlap still
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much]
+)
 @given(windows(), windows())
 def test_what_overlaps_still_could_not_be_cut(p, c):
     """Whoever loses at an end of the overlap goes on beyond it: to cut would leave two pieces."""
