@@ -21,10 +21,10 @@ from geodesic_core.mesh.surface_point import Curve, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.reprs import as_table
 
-_UNKNOWN = -2
-
 if TYPE_CHECKING:
     from geodesic_core.fields.distance_field import DistanceField
+
+_UNKNOWN = -2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -65,16 +65,18 @@ class Cells:
     @cached_property
     def adjacency(self) -> Ints:
         """(M, 2) int32: pairs of sources whose cells share a border, each once, in order."""
-        pairs = np.array([border.sources for border in self.borders], np.int32).reshape(-1, 2)
-        return np.unique(pairs, axis=0)
+        return np.unique(self._pairs, axis=0)
 
     @cached_property
     def border_lengths(self) -> Floats:
         """(M,) float64, mesh units: the length of border that each pair of `adjacency` shares."""
-        pairs = np.array([border.sources for border in self.borders], np.int32).reshape(-1, 2)
-        rows = np.unique(pairs, axis=0, return_inverse=True)[1]
+        rows = np.unique(self._pairs, axis=0, return_inverse=True)[1]
         lengths = [border.length for border in self.borders]
         return sums_by(rows.reshape(-1), np.array(lengths), len(self.adjacency))
+
+    @property
+    def _pairs(self) -> Ints:
+        return np.array([border.sources for border in self.borders], np.int32).reshape(-1, 2)
 
     @cached_property
     def centroids(self) -> tuple[SurfacePoint | None, ...]:

@@ -32,7 +32,7 @@ from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.retained.face_windows import FaceWindows, face_windows_of
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.tolerances import CERTIFIED, WIDENING
+from geodesic_core.tolerances import CERTIFIED
 
 _SAVED_PATHS = 100
 """Paths in a file, to the farthest vertex and others: they tell how large the gap is"""
@@ -179,8 +179,7 @@ def function_on_edges(
 ) -> dict[str, Floats | Longs]:
     """Return the least of windows and of distances of the ends, on each edge of two faces or more.
 
-    Sources on an edge count there as well. Windows are a little wider than they are: rounding
-    leaves gaps between them.
+    Sources on an edge count there as well.
     """
     edges, length, inside = surface.edges, surface.length.m, np.flatnonzero(~surface.is_rim)
     everywhere, none = length[inside], np.zeros(len(inside))
@@ -223,7 +222,7 @@ def _cones_of_windows(
     cones[:, HEIGHT], cones[:, SIGMA] = np.abs(rows[:, SY]), rows[:, window.SIGMA]
     begin = np.where(is_turned, length - rows[:, B1], rows[:, B0])
     end = np.where(is_turned, length - rows[:, B0], rows[:, B1])
-    cones[:, LOW], cones[:, HIGH] = begin - WIDENING * length, end + WIDENING * length
+    cones[:, LOW], cones[:, HIGH] = begin, end
     return edge, cones
 
 

@@ -15,6 +15,7 @@ from geodesic_core.kernels.borders.envelopes import REGION, START, envelope_alon
 from geodesic_core.kernels.curves.regions import SIDES_END, put_disc, put_side
 from geodesic_core.kernels.curves.rows import with_room
 from geodesic_core.kernels.jit import inlined, kernel
+from geodesic_core.tolerances import NARROW
 
 # Columns of a cone
 FOOT = 0  # a
@@ -58,6 +59,7 @@ def edge_function(first: Longs, cones: Floats, lengths: Floats) -> EdgeFunction:
             put_cone(regions[k], cones[base + k])
         of_edge = Regions(regions[:number], labels[:number], 0.0, 0.0)
         stretches = envelope_along(of_edge, (0.0, 0.0, 1.0, 0.0), lengths[e])
+        stretches = without_gaps(stretches, cones[base : base + number], lengths[e])
         counts[e] = len(stretches)
         rows, ends = (
             with_room(rows, total + len(stretches)),
@@ -68,7 +70,8 @@ def edge_function(first: Longs, cones: Floats, lengths: Floats) -> EdgeFunction:
             ends[total, 0] = lengths[e]
             if k > 0:
                 place = stretches[k, START]
-                place = crossing_near(cones, rows[total - 1, 0], rows[total, 0], place)
+                near = NARROW * lengths[e]
+                place = crossing_near(cones, rows[total - 1, 0], rows[total, 0], place, near)
                 before = ends[total - 2, 0] if k > 1 else 0.0
                 ends[total - 1, 0] = min(max(place, before), lengths[e])
             total += 1
@@ -84,10 +87,45 @@ def put_cone(region: Floats, cone: Floats) -> None:
 
 
 @kernel
-def crossing_near(cones: Floats, i: int, j: int, place: float) -> float:
-    """Return the place near another where two cones are equal, if they are; else the latter."""
-    best, least = place, abs(cone_at(cones, i, place) - cone_at(cones, j, place))
-    lo, hi = max(cones[i, LOW], cones[j, LOW]), min(cones[i, HIGH], cones[j, HIGH])
+def without_gaps(stretches: Floats, cones: Floats, length: float) -> Floats:
+    """Return an envelope without short stretches by which it jumps. Modifies the array.
+
+    Rounding leaves gaps between windows, in which the envelope is that of what lies behind.
+    """
+    total, count, k = len(stretches), min(1, len(stretches)), 1
+    while k < total:
+        long = k  # the next stretch that is not short, or is the last
+        while (
+            long + 1 < total and stretches[long + 1, START] - stretches[k, START] < NARROW * length
+        ):
+            long += 1
+        before = int(stretches[count - 1, REGION])
+        start, end = stretches[k, START], stretches[long, START]
+        jumps, region = 0.0, before
+        for n in range(k, long + 1):
+            jumps += jump_at(cones, region, int(stretches[n, REGION]), stretches[n, START])
+            region = int(stretches[n, REGION])
+        if jumps > jump_at(cones, before, region, end) + 2.0 * (end - start):
+            k = long
+        if region != before or k < long:
+            stretches[count, START] = stretches[k, START]
+            stretches[count, REGION] = stretches[k, REGION]
+            count += 1
+        k += 1
+    return stretches[:count]
+
+
+@inlined
+def jump_at(cones: Floats, i: int, j: int, place: float) -> float:
+    """Return by how much two cones differ."""
+    return abs(cone_at(cones, i, place) - cone_at(cones, j, place))
+
+
+@kernel
+def crossing_near(cones: Floats, i: int, j: int, place: float, near: float) -> float:
+    """Return the place no farther than ``near`` where two cones are equal, or nearly so."""
+    best, least = place, jump_at(cones, i, j, place)
+    lo, hi = place - near, place + near
     for _ in range(_CORRECTIONS):
         rate = slope_at(cones, i, place) - slope_at(cones, j, place)
         if rate == 0.0:
@@ -95,7 +133,7 @@ def crossing_near(cones: Floats, i: int, j: int, place: float) -> float:
         place -= (cone_at(cones, i, place) - cone_at(cones, j, place)) / rate
         if not lo <= place <= hi:
             break
-        apart = abs(cone_at(cones, i, place) - cone_at(cones, j, place))
+        apart = jump_at(cones, i, j, place)
         if not apart < least:
             break
         best, least = place, apart

@@ -180,6 +180,7 @@ def test_the_x_axis_is_a_point_or_a_vector(source):
         assert apart(toward.at(point).angle, 0.0) <= ANGLE
 
 
+@pytest.mark.jit
 def test_any_point_has_its_place_and_exp_leads_there():
     mesh = gc.TriangleMesh(*zoo.icosphere(2))
     for source in sources_of(mesh, 6):

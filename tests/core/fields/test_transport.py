@@ -121,6 +121,7 @@ def test_around_a_vertex_a_vector_turns_by_the_angle_defect(sides, tilt):
     assert apart(angle - ANGLE, 2.0 * math.pi - total) <= ROUNDED
 
 
+@pytest.mark.jit
 def test_on_spheres_transport_converges():
     """Against the vector that the great circle carries: it turns with the tangent."""
     errors = []

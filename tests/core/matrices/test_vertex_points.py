@@ -47,6 +47,7 @@ def test_no_point_is_made_for_each_vertex(
     )
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("layout", ["dense", "sparse"])
 @pytest.mark.parametrize("other", [None, POINTS[:60], list(range(60))])
 def test_a_table_of_vertices_is_symmetric_however_both_sides_are_written(

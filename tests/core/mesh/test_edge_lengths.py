@@ -104,6 +104,7 @@ def test_lines_of_equal_distance_and_borders_are_locations():
     assert away[[0, other]] == pytest.approx([0.25, 0.25], abs=SAME)
 
 
+@pytest.mark.jit
 @zoo.each(ALL)
 def test_a_surface_and_its_twin_without_positions_agree(case):
     mesh = mesh_of(case)

@@ -69,6 +69,7 @@ def test_any_points_can_be_the_first():
     assert len(found) == len(found.radius) + 2 == 30
 
 
+@pytest.mark.jit
 def test_no_two_are_nearer_than_the_covering_radius():
     mesh = gc.samples.knot(2000)
     found = gc.farthest_points(mesh, 25)

@@ -75,6 +75,7 @@ def test_smallest_move():
         assert gc.relax_points(mesh, [beside], iterations=1).converged is converged
 
 
+@pytest.mark.jit
 def test_density_draws_points():
     mesh = gc.samples.plane(2000)
     density = np.where(mesh.vertices[:, 0] > 0.5, 100.0, 1.0)
