@@ -154,7 +154,8 @@ _STOPS_AS_POINTS = {"source": "source", "target": "target", "waypoints": "via"}
 
 
 def _included(given: Given) -> dict[str, Any]:
-    return {"include": ["nearest_source", *(["gradient"] if given["gradient"] else [])]}
+    included = ["nearest_source", *(["gradient"] if given["gradient"] else [])]
+    return {"include": included, "certify": given["certify"]}
 
 
 def _of_distance(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
@@ -166,6 +167,14 @@ def _of_distance(_given: Given, found: Mapping[str, Any]) -> Iterator[str]:
     if reached.any():
         farthest = int(np.argmax(np.where(reached, distances, -1.0)))
         yield f"farthest    vertex {farthest} at {float(distances[farthest])!r}"
+    if "certificate" in found:
+        proof = found["certificate"]
+        state = "to" if proof["holds"] else "not within its error, but to"
+        yield f"proved      {state} {proof['relative_gap']:.2g} of the largest distance"
+
+
+def _proved(_given: Given) -> dict[str, Any]:
+    return {"certify": True}
 
 
 def _with_columns(answer: "Answer", out: Path | None) -> "Answer | None":
@@ -390,12 +399,34 @@ COMMANDS = {
                 ],
                 False,
             ),
+            "certify": (
+                Annotated[
+                    bool,
+                    typer.Option("--certify", help="Also prove the distances, and print the gap."),
+                ],
+                False,
+            ),
             **_ACCURACY,
             **_REACH,
         },
         {"sources": "source"},
         _of_distance,
         _included,
+    ),
+    "certify": Command(
+        "distances",
+        "Prove distances, and write a file that geodesic-verify checks.",
+        "Proving distances",
+        {
+            "source": (PointOrLabelSources, _NEEDED),
+            **_out("proof goes: .npz.", ".npz"),
+            "method": (BoundedMethodOption, "exact"),
+            **_ERRORS,
+            **_REACH,
+        },
+        {"sources": "source"},
+        _of_distance,
+        _proved,
     ),
     "path": Command(
         "path",

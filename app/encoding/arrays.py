@@ -35,8 +35,8 @@ def to_npz(answer: Answer, dtype: str) -> Encoded:
     """Encode a sparse matrix as `scipy.sparse.load_npz` reads it, or arrays by name."""
     if answer.named is not None:
         file = BytesIO()
-        np.savez(file, allow_pickle=False, **answer.named)
-        return [file.getbuffer()], headers_of(answer, ())
+        np.savez_compressed(file, allow_pickle=False, **answer.named)
+        return [file.getbuffer()], headers_of(answer, answer.shown)
     from scipy.sparse import coo_array
 
     _, rows, columns = (answer.members[name] for name in answer.arrays)

@@ -1,6 +1,7 @@
 """Distances from the nearest of some sources, to all vertices or to some targets."""
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from itertools import chain
 from typing import Any
 
@@ -8,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import geodesic_core as gc
-from app.encoding import CSV, JSON, NPY, OCTETS, PLY, Answer, Indices
+from app.encoding import CSV, JSON, NPY, NPZ, OCTETS, PLY, Answer, Indices, Representation
 from app.errors import Fault, problem
 from app.queries.accuracy import (
     bound_of,
@@ -17,7 +18,7 @@ from app.queries.accuracy import (
     with_default_accuracy,
 )
 from app.queries.base import VALUES_OF_POINT, ExecutionContext
-from app.queries.cost_model import PER_POINT, sweep_seconds
+from app.queries.cost_model import PER_FACE_CERTIFIED, PER_POINT, sweep_seconds
 from app.queries.from_sources import FromSources
 from app.queries.points import (
     SurfacePoints,
@@ -28,12 +29,14 @@ from app.queries.points import (
     numbered,
     to_sources,
 )
-from app.queries.validation import WrittenPoints, invalid_fields, naming
+from app.queries.validation import FAULTS_SHOWN, WrittenPoints, invalid_fields, naming
 from app.queries.views import columns_of, surface_of, table_of_distances
+from app.schemas.points import CurveSource
 from app.schemas.requests import DistancesRequest
 from app.store.meshes import OpenMesh
 
-_VALUES_INCLUDED = {"nearest_source": 1, "gradient": 3}
+_BOUNDS = "lower", "upper"
+_VALUES_INCLUDED = {"nearest_source": 1, "gradient": 3, "lower": 1, "upper": 1}
 """Values in JSON for each distance, by name."""
 
 
@@ -45,24 +48,33 @@ class DistancesQuery(FromSources[DistancesRequest]):
 
     @classmethod
     def normalized(cls, request: DistancesRequest) -> DistancesRequest:
-        """Name error or effort, and each included array once; refuse the gradient at targets."""
+        """Name error or effort, and each included array once; refuse what does not go together."""
         if "gradient" in request.include and request.targets is not None:
             message = "gradient covers all vertices; ask for it without targets"
             raise invalid_fields(["/include"], message)
+        if request.certify:
+            _check_certifiable(request)
+        elif set(_BOUNDS) & set(request.include):
+            raise invalid_fields(["/include"], "lower and upper go with certify only")
         included = list(dict.fromkeys(request.include))
         return with_default_accuracy(request.model_copy(update={"include": included}))
 
     @property
     def offers(self) -> Sequence[str]:
         """The media types of the answer; PLY has room for distances of all vertices only."""
-        return (JSON, NPY, OCTETS, CSV, *([PLY] if self.request.targets is None else []))
+        request = self.request
+        of_all = [PLY] if request.targets is None else []
+        return (JSON, NPY, OCTETS, CSV, *of_all, *([NPZ] if request.certify else []))
 
     def check_format(self, media_type: str) -> None:
-        """Refuse a second array in binary."""
+        """Refuse a second array in binary, and a proof whose numbers are rounded."""
         message = "does not come with a bare array; ask for json, csv or ply"
         faults = [Fault("/include", f"{name} {message}") for name in self.request.include]
-        if faults and media_type in (NPY, OCTETS):
-            raise problem("invalid_request", f"{media_type} holds one array", errors=tuple(faults))
+        if faults and media_type in (NPY, OCTETS, NPZ):
+            detail = "the proof" if media_type == NPZ else "one array"
+            raise problem("invalid_request", f"{media_type} holds {detail}", errors=tuple(faults))
+        if media_type == NPZ and self.representation.dtype != Representation.dtype:
+            raise invalid_fields(["/query/dtype"], "a proof is in float64")
 
     def value_count(self) -> int:
         """Return the number of distances, and of the values that are included with each."""
@@ -76,24 +88,36 @@ class DistancesQuery(FromSources[DistancesRequest]):
         return chain(super().written_points(), numbered("/targets", self.request.targets or ()))
 
     def rough_seconds(self) -> float:
-        """Return the cost of a sweep to the limit."""
+        """Return the cost of a sweep to the limit, and of the proof."""
         request = self.request
         points = self.source_count + len(request.targets or ())
-        return sweep_seconds(self.size.faces, request, self.share) + PER_POINT * points
+        proof = PER_FACE_CERTIFIED * self.size.faces if request.certify else 0.0
+        return sweep_seconds(self.size.faces, request, self.share) + PER_POINT * points + proof
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
-        """Sweep once."""
+        """Sweep once, and prove what was found if asked for."""
         request, mesh = self.request, opened.mesh
         if "gradient" in request.include:
             with naming((gc.errors.NotEmbedded, "/include")):
                 mesh.require_embedded("a gradient")
         count = self.source_count
         sources, targets = points[:count], None if request.targets is None else points[count:]
+        if request.certify:
+            _check_vertices(targets or ())
         starts = to_sources(mesh, request.sources, sources)
-        limit = request.max_distance
+        limit, parts = request.max_distance, 2 if request.certify else 1
         field = solve_field(
-            opened, request, starts, context, max_distance=limit, targets=targets or ()
+            opened,
+            request,
+            starts,
+            context.part(0, parts),
+            max_distance=limit,
+            targets=targets or (),
         )
+        certificate = None
+        if request.certify:
+            field = copy(field)  # that of the cache keeps its bound, as others are answered by it
+            certificate = field.certify(**context.part(1, parts).options)
         distances = _at(targets, field.distances, field.distance_at)
         members = self.members(
             opened,
@@ -102,6 +126,7 @@ class DistancesQuery(FromSources[DistancesRequest]):
             sources=[describe_source(mesh, start) for start in starts],
             **_described(mesh, targets),
             distances=distances,
+            **_told(certificate),
             unreachable=_unreachable(mesh, sources, targets, distances),
             stats=stats_of(field.stats),
         )
@@ -111,6 +136,9 @@ class DistancesQuery(FromSources[DistancesRequest]):
             included["nearest_source"] = Indices(nearest)
         if "gradient" in request.include:
             included["gradient"] = field.gradient
+        for name in _BOUNDS:
+            if name in request.include:
+                included[name] = _at(targets, getattr(certificate, name), field.distance_at)
         members |= included
         columns = columns_of(members)
         return Answer(
@@ -119,7 +147,33 @@ class DistancesQuery(FromSources[DistancesRequest]):
             ("distances", *included),
             table=table_of_distances("vertex" if targets is None else "target", columns),
             surface=surface_of(mesh, columns) if targets is None else None,
+            named=None if certificate is None else certificate.arrays,
         )
+
+
+def _check_certifiable(request: DistancesRequest) -> None:
+    """Refuse to prove what has no certificate."""
+    if request.method == "fast":
+        raise invalid_fields(["/certify"], "a fast answer has no certificate: ask for another one")
+    if any(isinstance(source, CurveSource) for source in request.sources):
+        message = "distances from curves have no certificate yet: give points as sources"
+        raise invalid_fields(["/certify"], message)
+
+
+def _check_vertices(targets: SurfacePoints) -> None:
+    """Refuse targets off vertices, whose distances a certificate does not bound."""
+    off = [i for i, target in enumerate(targets) if target.vertex_index is None]
+    if off:
+        places = [f"/targets/{i}" for i in off[:FAULTS_SHOWN]]
+        raise invalid_fields(places, "is no vertex: a certificate proves distances of vertices")
+
+
+def _told(certificate: gc.Certificate | None) -> dict[str, Any]:
+    """Return the member that tells what a certificate proves."""
+    if certificate is None:
+        return {}
+    names = "holds", "relative_gap", "worst_face", "worst_violation"
+    return {"certificate": {name: getattr(certificate, name) for name in names}}
 
 
 def _described(mesh: gc.TriangleMesh, targets: SurfacePoints | None) -> dict[str, Any]:

@@ -15,8 +15,8 @@ from app.encoding.views import Column, Values, rows_of
 def columns_of(members: Mapping[str, Any]) -> dict[str, Values]:
     """Return the columns of an answer by name: distances, then included ones (vectors as three)."""
     columns: dict[str, Values] = {"distance": members["distances"]}
-    if "nearest_source" in members:
-        columns["nearest_source"] = members["nearest_source"]
+    names = "nearest_source", "lower", "upper"
+    columns |= {name: members[name] for name in names if name in members}
     if "gradient" in members:
         columns |= {f"gradient_{x}": members["gradient"][:, i] for i, x in enumerate("xyz")}
     return columns

@@ -15,12 +15,13 @@ class ErrorBound(BaseModel):
 
     Approximate distances are too short by that much at most; the length of an approximate path is
     too long by that much at most. With the method `fast` both are too long, and the bound is an
-    estimate: in 19 of 20 measured fields, 99 of 100 vertices lie within it.
+    estimate: in 19 of 20 measured fields, 99 of 100 vertices lie within it. A certified bound is
+    proved for these very distances, which differ from their proved bounds by that much at most.
     """
 
     type: Literal["relative", "absolute"]
     value: float
-    kind: Literal["guaranteed", "estimated"]
+    kind: Literal["guaranteed", "estimated", "certified"]
 
 
 class ResolvedPoint(BaseModel):
@@ -63,6 +64,20 @@ class Unreachable(BaseModel):
     beyond_max_distance: int
 
 
+class Certificate(BaseModel):
+    """What a proof of distances tells; as `npz` the answer is the proof itself."""
+
+    holds: bool = Field(
+        description="Whether it proves, to 1e-8 of the largest distance, what `method` promises"
+    )
+    relative_gap: float = Field(
+        description="The largest difference of the bounds of a vertex, as a share of the largest "
+        "distance"
+    )
+    worst_face: int = Field(description="The face that widens the gap most")
+    worst_violation: float = Field(description="By how much it does, in mesh units")
+
+
 class DistancesAnswer(BaseModel):
     """Distances in mesh units, ``null`` where unreachable."""
 
@@ -80,6 +95,17 @@ class DistancesAnswer(BaseModel):
         default=None,
         description="If included: a unit vector at each vertex, opposite to the first segment of "
         "its shortest path; three times `null` at sources and where unreachable",
+    )
+    lower: list[float | None] | None = Field(
+        default=None,
+        description="If included: proved lower bounds of the exact distances; those beyond "
+        "`max_distance` have some, too",
+    )
+    upper: list[float | None] | None = Field(
+        default=None, description="If included: lengths of paths, which bound them from above"
+    )
+    certificate: Certificate | None = Field(
+        default=None, description="What the proof tells, if asked for by `certify`"
     )
     unreachable: Unreachable
     stats: dict[str, Any]

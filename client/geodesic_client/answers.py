@@ -26,7 +26,7 @@ class ErrorBound:
     """``relative`` or ``absolute``"""
     value: float
     kind: str
-    """``guaranteed`` or ``estimated``"""
+    """``guaranteed``, ``estimated``, or ``certified``: proved for this answer"""
 
 
 @dataclass(frozen=True)
@@ -57,6 +57,20 @@ class ListedMesh:
 
 
 @dataclass(frozen=True)
+class Certificate:
+    """What a proof of distances tells."""
+
+    holds: bool
+    """Whether it proves what the method promises, to 1e-8 of the largest distance"""
+    relative_gap: float
+    """The largest difference of the bounds of a vertex, as a share of the largest distance"""
+    worst_face: int
+    """The face that widens the gap most"""
+    worst_violation: float
+    """By how much it does, mesh units"""
+
+
+@dataclass(frozen=True)
 class Distances:
     """Distances of all vertices, or of the targets; infinite where they cannot be reached."""
 
@@ -70,6 +84,12 @@ class Distances:
     """Index of the nearest source, −1 where unreachable; None if it was not requested"""
     gradient: Floats | None
     """The direction in which distance grows, (V, 3); None if it was not requested"""
+    lower: Floats | None = None
+    """Proved lower bounds of the distances; None if they were not requested"""
+    upper: Floats | None = None
+    """Proved upper bounds, lengths of paths; None if they were not requested"""
+    certificate: Certificate | None = None
+    """What the proof tells; None if none was requested"""
 
 
 @dataclass(frozen=True)
@@ -392,6 +412,8 @@ def to_distances(response: httpx2.Response) -> Distances:
         members = response.json()
         distances = _with_infinity(members["distances"])
     nearest, gradient = members.get("nearest_source"), members.get("gradient")
+    lower, upper = members.get("lower"), members.get("upper")
+    certificate = members.get("certificate")
     return Distances(
         mesh_id=members["mesh_id"],
         method=members["method"],
@@ -400,6 +422,9 @@ def to_distances(response: httpx2.Response) -> Distances:
         unreachable=members["unreachable"],
         nearest_source=None if nearest is None else _with_minus_one(nearest),
         gradient=None if gradient is None else np.array(gradient, np.float64),
+        lower=None if lower is None else _with_infinity(lower),
+        upper=None if upper is None else _with_infinity(upper),
+        certificate=None if certificate is None else Certificate(**certificate),
     )
 
 

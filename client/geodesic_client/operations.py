@@ -197,12 +197,14 @@ def distances(
     effort: Literal[1, 2, 4, 8] | None = None,
     max_distance: float | None = None,
     barriers: Sequence[int] = (),
-    include: Sequence[Literal["nearest_source", "gradient"]] = (),
+    include: Sequence[Literal["nearest_source", "gradient", "lower", "upper"]] = (),
+    certify: bool = False,
     progress: Progress = ignore_progress,
 ) -> Flow[Distances]:
     """Return the distance of each vertex, or of each target, from the nearest source.
 
-    ``sources`` is a point, or several.
+    ``sources`` is a point, or several. With ``certify`` the distances are proved; ``lower`` and
+    ``upper`` are bounds of each.
     """
     body = _body(
         sources=as_points(sources),
@@ -214,6 +216,7 @@ def distances(
         max_distance=max_distance,
         barriers=barriers,
         include=include,
+        certify=certify or None,  # older services do not know it
     )
     media_type = JSON if len(include) else NPY
     return (yield from _ask(mesh, "distances", body, to_distances, progress, media_type))

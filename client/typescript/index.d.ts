@@ -983,6 +983,32 @@ export interface components {
             chord_error?: number | null;
         };
         /**
+         * Certificate
+         * @description What a proof of distances tells; as `npz` the answer is the proof itself.
+         */
+        Certificate: {
+            /**
+             * Holds
+             * @description Whether it proves, to 1e-8 of the largest distance, what `method` promises
+             */
+            holds: boolean;
+            /**
+             * Relative Gap
+             * @description The largest difference of the bounds of a vertex, as a share of the largest distance
+             */
+            relative_gap: number;
+            /**
+             * Worst Face
+             * @description The face that widens the gap most
+             */
+            worst_face: number;
+            /**
+             * Worst Violation
+             * @description By how much it does, in mesh units
+             */
+            worst_violation: number;
+        };
+        /**
          * Curve
          * @description A curve on the surface: straight segments, each inside one face.
          */
@@ -1157,6 +1183,18 @@ export interface components {
                 number | null,
                 number | null
             ][] | null;
+            /**
+             * Lower
+             * @description If included: proved lower bounds of the exact distances; those beyond `max_distance` have some, too
+             */
+            lower?: (number | null)[] | null;
+            /**
+             * Upper
+             * @description If included: lengths of paths, which bound them from above
+             */
+            upper?: (number | null)[] | null;
+            /** @description What the proof tells, if asked for by `certify` */
+            certificate?: components["schemas"]["Certificate"] | null;
             unreachable: components["schemas"]["Unreachable"];
             /** Stats */
             stats: {
@@ -1239,9 +1277,14 @@ export interface components {
             max_distance?: number | null;
             /**
              * Include
-             * @description Further values of each point, in JSON, CSV and PLY: `nearest_source`, an index into `sources`; `gradient`, the direction in which distance grows fastest, for all vertices only. Default: `[]`
+             * @description Further values of each point, in JSON, CSV and PLY: `nearest_source`, an index into `sources`; `gradient`, the direction in which distance grows fastest, for all vertices only; with `certify`, `lower` and `upper`, the proved bounds. Default: `[]`
              */
-            include?: ("nearest_source" | "gradient")[];
+            include?: ("nearest_source" | "gradient" | "lower" | "upper")[];
+            /**
+             * Certify
+             * @description Also prove the distances of vertices, for `exact` and `approximate`, from sources that are points. It takes about half a millisecond a face. The answer has a `certificate`, and as `npz` it is the file that `geodesic-verify` checks. Default: `false`
+             */
+            certify?: boolean;
         };
         /**
          * EdgePoint
@@ -1302,7 +1345,8 @@ export interface components {
          *
          *     Approximate distances are too short by that much at most; the length of an approximate path is
          *     too long by that much at most. With the method `fast` both are too long, and the bound is an
-         *     estimate: in 19 of 20 measured fields, 99 of 100 vertices lie within it.
+         *     estimate: in 19 of 20 measured fields, 99 of 100 vertices lie within it. A certified bound is
+         *     proved for these very distances, which differ from their proved bounds by that much at most.
          */
         ErrorBound: {
             /**
@@ -1316,7 +1360,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "guaranteed" | "estimated";
+            kind: "guaranteed" | "estimated" | "certified";
         };
         /**
          * FacePoint
@@ -3417,7 +3461,7 @@ export interface operations {
             };
         };
         responses: {
-            /** @description The distances; as PLY, the mesh with the distances at its vertices, for all vertices only. In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` names what is too long for one */
+            /** @description The distances; as PLY, the mesh with the distances at its vertices, for all vertices only; with `certify`, as an archive of numpy, what proves them, for `geodesic-verify`. In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` names what is too long for one */
             200: {
                 headers: {
                     Vary: components["headers"]["Vary"];
@@ -3434,6 +3478,7 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["DistancesAnswer"];
                     "application/x-npy": string;
+                    "application/x-npz": string;
                     "application/octet-stream": string;
                     "text/csv": string;
                     "model/ply": string;
@@ -3468,6 +3513,7 @@ export interface operations {
                 content: {
                     "application/json": string;
                     "application/x-npy": string;
+                    "application/x-npz": string;
                     "application/octet-stream": string;
                     "text/csv": string;
                     "model/ply": string;

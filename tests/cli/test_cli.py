@@ -1169,3 +1169,30 @@ def test_the_manual_names_every_setting_and_no_other() -> None:
     manual = (ROOT / "docs" / "operations.md").read_text()
     named = set(re.findall(r"^\| `(GEODESIC_\w+)`", manual, re.MULTILINE))
     assert named == {variable_of(field) for field in Settings.model_fields}
+
+
+@pytest.mark.parametrize("method", [[], ["--method", "approximate", "--relative-error", 0.05]])
+def test_proofs_are_files_for_the_checker(run: Run, plane: Path, method: list[object]) -> None:
+    mesh = gc.load_mesh(plane)
+    if method:
+        certificate = gc.approximate_distance(mesh, [0, 7], 0.05).certify()
+    else:
+        certificate = gc.exact_distance(mesh, [0, 7]).certify()
+    certificate.save("expected.npz")
+    asked = (plane, "--source", 0, "--source", 7, *method)
+
+    ran = run("certify", *asked, "--out", "proof.npz")
+
+    assert Path("proof.npz").read_bytes() == Path("expected.npz").read_bytes()
+    gap = f"to {certificate.relative_gap:.2g} of the largest distance"
+    assert ran.figure("proved") == gap
+    assert ran.figure("error bound").endswith("(absolute, certified)")
+    assert run("distance", *asked, "--certify").figure("proved") == gap
+    assert "proved" not in run("distance", *asked).out
+
+
+def test_fast_distances_are_not_proved(run: Run, plane: Path) -> None:
+    ran = run("distance", plane, "--source", 0, "--method", "fast", "--certify")
+    assert ran.code != 0
+    assert "--certify: a fast answer has no certificate" in ran.err
+    assert "must end in .npz" in run("certify", plane, "--source", 0, "--out", "proof.csv").err

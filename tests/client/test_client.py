@@ -70,6 +70,27 @@ def test_distances_are_the_library_s_to_the_bit(
     np.testing.assert_allclose(rich.gradient, field.gradient, equal_nan=True)
 
 
+def test_certificates_are_the_library_s_to_the_bit(
+    service: Client, mesh: Mesh, same: gc.TriangleMesh
+) -> None:
+    field = gc.exact_distance(same, [0, 7])
+    certificate = field.certify()
+    found = service.distances(mesh, [0, 7], certify=True, include=["lower", "upper"])
+    np.testing.assert_array_equal(found.lower, certificate.lower)
+    np.testing.assert_array_equal(found.upper, certificate.upper)
+    bare = service.distances(mesh, [0, 7], certify=True)
+    assert bare.certificate == found.certificate
+    assert bare.error_bound == found.error_bound
+    assert (bare.error_bound.kind, bare.error_bound.value) == ("certified", field.error_bound.value)
+    assert (bare.lower, bare.upper) == (None, None)
+    assert vars(bare.certificate) == {
+        "holds": True,
+        "relative_gap": certificate.relative_gap,
+        "worst_face": certificate.worst_face,
+        "worst_violation": certificate.worst_violation,
+    }
+
+
 @pytest.mark.parametrize("source", [7, np.int64(7), {"vertex": 7}], ids=repr)
 def test_a_single_source_needs_no_list(service: Client, mesh: Mesh, source: Any) -> None:
     distances, lines = service.distances(mesh, source), service.isolines(mesh, source, count=3)

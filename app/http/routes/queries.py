@@ -69,8 +69,9 @@ OPERATIONS = (
         "computeDistances",
         "Distances from sources to all vertices, exact or within a chosen error",
         "Return the distance along the surface from the nearest source to each vertex.",
-        "The distances; as PLY, the mesh with the distances at its vertices, for all vertices only",
-        (NPY, OCTETS, CSV, PLY),
+        "The distances; as PLY, the mesh with the distances at its vertices, for all vertices "
+        "only; with `certify`, as an archive of numpy, what proves them, for `geodesic-verify`",
+        (NPY, NPZ, OCTETS, CSV, PLY),
     ),
     _PATH,
     Operation(

@@ -203,7 +203,7 @@ function notesOn({ bound, unreachable, warnings }: Field, { method }: State): st
 
 export function boundInWords({ value, kind, type }: ErrorBound): string {
   const size = type === "relative" ? percent(value) : written(value, 3);
-  return `error ${kind === "guaranteed" ? "at most" : "about"} ${size} (${kind})`;
+  return `error ${kind === "estimated" ? "about" : "at most"} ${size} (${kind})`;
 }
 
 /** Return by how many per cent each distance is wrong; -1 where unreachable. */
