@@ -292,8 +292,9 @@ def run_checker(folder, *arguments):
     script = (
         f"{blocked}sys.argv[0] = 'verify'; runpy.run_path({str(CHECKER)!r}, run_name='__main__')"
     )
-    command = [sys.executable, "-I", "-c", script, *arguments]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
+    files = [str(folder / name) for name in arguments[:2]]
+    command = [sys.executable, "-I", "-c", script, *files, *arguments[2:]]
+    return subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
 
 
 def write_obj(path, mesh):
