@@ -458,33 +458,28 @@ class Proof(NamedTuple):
     """(F,) by how much f may rise too fast in each face; 0 where no path comes"""
 
 
-def rises_across(surface: Surface, function: Pieces) -> Array:
-    """Return bounds of f(q) - f(p) - |pq| for p and q on two edges of each face, 0 at least."""
+def prove(
+    surface: Surface,
+    sources: list[Source],
+    given: dict[str, Array],
+    watch: Callable[[float], None] = lambda _: None,
+) -> Proof:
+    """Return lower bounds of all distances, by the function of a certificate.
+
+    The sources belong to the question: they are never taken from the file. ``watch`` is called with
+    the share that is done.
+    """
+    refuse_unless(len(sources) > 0, "there are no sources")
+    function = Pieces(surface, given)
     tau = np.zeros(len(surface.faces))
     for lo in range(0, len(tau), BLOCK):
+        watch(lo / len(tau))
         rows = np.arange(lo, min(lo + BLOCK, len(tau)))
         for c in range(3):
             out, into, cosine, sine = surface.corner(rows, c)
             for e, g in ((out, into), (into, out)):
                 worst = function.across(surface.faces[rows, c], e, g, cosine, sine)
                 np.maximum.at(tau, rows, worst)
-    return tau
-
-
-def prove(
-    surface: Surface,
-    sources: list[Source],
-    given: dict[str, Array],
-    rises: Callable[[Surface, Pieces], Array] = rises_across,
-) -> Proof:
-    """Return lower bounds of all distances, by the function of a certificate.
-
-    The sources belong to the question: they are never taken from the file. The library gives
-    ``rises`` of its own, which are faster.
-    """
-    refuse_unless(len(sources) > 0, "there are no sources")
-    function = Pieces(surface, given)
-    tau = rises(surface, function)
     _rise_from_sources(surface, function, sources, tau)
     tau = (tau + function.jumps[surface.of_face].sum(axis=1)) * UP
     values = function.values
