@@ -25,6 +25,7 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -155,7 +156,7 @@ class Surface:
         values: Array = None,
         barriers: Array = (),
     ) -> None:
-        """Take (V, 3) positions or None, (F, 3) faces, and (F, 3) lengths or None.
+        """Take (V, 3) positions or None, (F, 3) faces, and (F, 3) lengths or None, which count.
 
         No path crosses the ``barriers``, some of the faces. Faces at whose corners the ``values``
         are infinite are left out as well: no path leads there.
@@ -163,18 +164,22 @@ class Surface:
         self.given = np.ascontiguousarray(faces, np.int64)
         refuse_unless(self.given.ndim == 2 and self.given.shape[1] == 3, "faces are no triangles")
         refuse_unless(self.given.size > 0 and self.given.min() >= 0, "there are no faces")
-        self.vertices = None if vertices is None else np.asarray(vertices, np.float64)
-        self.count = int(self.given.max()) + 1 if vertices is None else len(vertices)
-        if values is not None and np.shape(values) == (max(self.count, len(values)),):
-            self.count = len(values)
+        measures = np.asarray(vertices if lengths is None else lengths, np.float64)
+        self.vertices = measures if lengths is None else None
+        self.count = int(self.given.max()) + 1
+        for per_vertex in (values, vertices):
+            self.count = self.count if per_vertex is None else len(per_vertex)
         refuse_unless(self.given.max() < self.count, "a face has a vertex that there is not")
-        measures: Any = self.vertices if lengths is None else np.asarray(lengths, np.float64)
+        shape = (self.count, 3) if lengths is None else self.given.shape
+        refuse_unless(measures.shape == shape, "positions or lengths do not go with the faces")
         refuse_unless(
             bool((np.abs(measures) <= HUGE).all()), "a number of the mesh is out of range"
         )
-        self.label = self._labels(lengths)
+        self.label = self._labels(measures)
         faces = self.label[self.given]
-        is_open = np.zeros(faces.shape, bool) if values is None else np.isinf(values[faces])
+        values = np.zeros(self.count) if values is None else _numbers(values)
+        refuse_unless(values.shape == (self.count,), "there is not one value a vertex")
+        is_open = np.isposinf(values[faces])
         barriers = np.asarray(barriers, np.int64)
         refuse_unless(bool(np.isin(barriers, np.arange(len(faces))).all()), "a barrier is no face")
         is_open[barriers] = False
@@ -185,7 +190,6 @@ class Surface:
         is_kept[barriers] = False
         self.kept = np.flatnonzero(is_kept)
         self.faces = faces[self.kept]
-        refuse_unless(len(self.faces) > 0, "no face is reached")
         ends = np.sort(np.stack([self.faces, np.roll(self.faces, -1, axis=1)], axis=2), axis=2)
         keys = ends[..., 0] * self.count + ends[..., 1]
         _, first, of_face = np.unique(keys.ravel(), return_index=True, return_inverse=True)
@@ -196,7 +200,7 @@ class Surface:
             step = difference(place[:, 1], place[:, 0])
             self.long_length = norm(*(step[:, k] for k in range(3)))
         else:
-            given = np.asarray(lengths, np.float64)[self.kept]
+            given = measures[self.kept]
             refuse_unless(
                 bool((given.ravel()[first][of_face] == given.ravel()).all()), "two lengths"
             )
@@ -205,14 +209,13 @@ class Surface:
         self.length = Ball(m, (self.long_length.r.astype(float) + U * m) * UP)
         refuse_unless(bool((self.length.low > 0).all()), "an edge has no length")
 
-    def _labels(self, lengths: Array) -> Array:
+    def _labels(self, measures: Array) -> Array:
         """Return for each vertex the lowest of those joined to it by edges of no length."""
         label = np.arange(self.count)
         tail, head = self.given.ravel(), np.roll(self.given, -1, axis=1).ravel()
-        if lengths is None and self.vertices is not None:
-            joined = (self.vertices[tail] == self.vertices[head]).all(axis=1)
-        else:
-            joined = np.asarray(lengths).ravel() == 0.0
+        joined = measures.ravel() == 0.0
+        if self.vertices is not None:
+            joined = (measures[tail] == measures[head]).all(axis=1)
         tail, head = tail[joined], head[joined]
         while (label[tail] != label[head]).any():
             lowest = np.minimum(label[tail], label[head])
@@ -298,12 +301,11 @@ class Pieces:
     def __init__(self, surface: Surface, given: dict[str, Array]) -> None:
         """Take the arrays of a file, and refuse what is no function on the edges of the surface."""
         self.surface, edges, is_rim = surface, surface.edges, surface.is_rim
-        try:
-            names = ("a", "h", "sigma", "t", "values")
-            a, h, sigma, t1, values = (np.asarray(given[name], np.float64) for name in names)
-            count = np.asarray(given["pieces"], np.int64)
-        except (KeyError, TypeError, ValueError) as error:
-            raise Refused(f"the file has no function on the edges: {error}") from None
+        names = ("values", "pieces", "a", "h", "sigma", "t")
+        refuse_unless(given.keys() >= set(names), "the file has no function on the edges")
+        values, pieces, a, h, sigma, t1 = (_numbers(given[name]) for name in names)
+        refuse_unless(bool((np.abs(pieces) <= 1e9).all()), "a number of pieces is out of range")
+        count = pieces.astype(np.int64)
         refuse_unless(values.shape == (surface.count,), "there is not one value a vertex")
         refuse_unless(count.shape == (len(edges),), "there is not one number of pieces an edge")
         refuse_unless(
@@ -449,6 +451,14 @@ class Pieces:
         return worst
 
 
+def _numbers(given: Array) -> Array:
+    """Return an array of a file as numbers in double precision."""
+    try:
+        return np.asarray(given, np.float64)
+    except (TypeError, ValueError):
+        raise Refused("an array holds something else than numbers") from None
+
+
 class Proof(NamedTuple):
     """What a certificate proves."""
 
@@ -559,7 +569,7 @@ def measure(surface: Surface, sources: list[Source], paths: Paths) -> tuple[Arra
     """Return the vertices at which paths end, and upper bounds of their distances."""
     first, faces = (np.asarray(array, np.int64) for array in (paths.first, paths.faces))
     ends = [np.asarray(array, np.float64) for array in (paths.tails, paths.heads)]
-    refuse_unless(first.ndim == 1 and len(first) > 0 and first[0] == 0, "paths begin nowhere")
+    refuse_unless(first.ndim == 1 and len(first) > 1 and first[0] == 0, "there are no paths")
     refuse_unless(bool((np.diff(first) > 0).all()) and first[-1] == len(faces), "a path has no end")
     row = np.full(len(surface.given), -1)
     row[surface.kept] = np.arange(len(surface.kept))
@@ -661,8 +671,8 @@ def main() -> int:
         proof = prove(surface, options.source, given)
         paths = Paths(*(given[f"path_{name}"] for name in Paths._fields))
         ends, upper = measure(surface, options.source, paths)
-    except (Refused, OSError, ValueError, KeyError) as error:
-        print(f"refused: {error}", file=sys.stderr)
+    except (Refused, OSError, ValueError, KeyError, IndexError, BadZipFile) as error:
+        print(f"refused: {type(error).__name__}: {error}", file=sys.stderr)
         return 1
     gaps, face = upper - proof.lower[ends], int(proof.tau.argmax())
     worst, largest = int(gaps.argmax()), upper.max()

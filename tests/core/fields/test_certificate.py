@@ -186,6 +186,9 @@ FORGERIES = {
     "unreached": lambda rng, a: a["values"].__setitem__(
         int(rng.integers(len(a["values"]))), np.inf
     ),
+    "all minus infinity": lambda _, a: a.update(values=np.full(len(a["values"]), -np.inf)),
+    "all infinite": lambda _, a: a.update(values=np.full(len(a["values"]), np.inf)),
+    "a value more": lambda _, a: a.update(values=np.append(a["values"], 0.0)),
     "huge": lambda rng, a: a["h"].__setitem__(int(rng.integers(len(a["a"]))), 1e200),
     "a negative height": lambda rng, a: a["h"].__setitem__(int(rng.integers(len(a["a"]))), -1.0),
     "a piece fewer": lambda _, a: a.update({n: a[n][:-1] for n in ("a", "h", "sigma", "t")}),
@@ -323,7 +326,9 @@ def test_the_checker_knows_lengths_and_barriers(tmp_path):
     mesh = gc.samples.terrain(300)
     mesh = mesh.with_lengths(edge_lengths(mesh))
     gc.exact_distance(mesh, 3, barriers=[20, 21]).certify().save(tmp_path / "proof.npz")
-    np.savez(tmp_path / "mesh.npz", faces=mesh.faces, lengths=mesh.lengths)
+    np.savez(
+        tmp_path / "mesh.npz", faces=mesh.faces, lengths=mesh.lengths, vertices=0.0 * mesh.vertices
+    )
     given = "mesh.npz", "proof.npz", "--source", "v3", "--barriers", "20,21"
     done = run_checker(tmp_path, *given)
     assert done.returncode == 0, done.stderr
@@ -332,7 +337,7 @@ def test_the_checker_knows_lengths_and_barriers(tmp_path):
 def test_the_checker_needs_numpy_alone():
     nodes = ast.walk(ast.parse(CHECKER.read_text()))
     froms = {node.module for node in nodes if isinstance(node, ast.ImportFrom)}
-    assert froms <= {"collections.abc", "pathlib", "typing"}
+    assert froms <= {"collections.abc", "pathlib", "typing", "zipfile"}
     lines = re.findall(r"^import (.+)$", CHECKER.read_text(), re.MULTILINE)
     assert lines == ["argparse", "sys", "numpy as np"]
 
@@ -342,7 +347,7 @@ def test_the_checker_needs_numpy_alone():
     [
         ({"path_tails": 0.5}, "a point of a path is beside its face"),
         ({"path_faces": 1}, "a path"),
-        ({"path_first": 1}, "paths begin nowhere"),
+        ({"path_first": 1}, "there are no paths"),
     ],
 )
 def test_paths_that_are_none_are_refused(change, why):
