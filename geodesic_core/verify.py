@@ -11,13 +11,13 @@ its lower vertex, the pieces follow each other without gaps, t from 0 to 1. On a
 sigma + sqrt((x - a)^2 + h^2), where x = t * length. Each vertex has a value. Let tau of a face be
 at least f(q) - f(p) - |pq| for all p and q on its rim, and f(q) - c - |sq| for a source s in it
 that starts at c. A path from a source to a vertex v crosses faces. Each crossing raises f by its
-length and tau at most, and what lies between the first and the last crossing of a face is no
-shorter than the straight way. So the path is not shorter than f(v) less the sum of tau over all
-faces.
+length and tau at most. Where it crosses a face more than once, the straight way from the first
+point in the face to the last is no longer. So the path is at least f(v) less the sum of tau over
+all faces long.
 
-**Rounding.** Numbers of the mesh and of the file are exact as they stand. All that is computed from
-them is a ball, a midpoint and a radius, and the rounding of each operation goes into the radius.
-Only IEEE addition, multiplication, division and square root are relied on.
+**Rounding.** The numbers of the mesh and of the file are taken as exact. Whatever is computed from
+them is a ball: a midpoint and a radius, which takes in the rounding of each operation. Only IEEE
+addition, multiplication, division and square root are relied on.
 """
 
 import argparse
@@ -36,7 +36,7 @@ UP = 1.0 + 2.0**-48
 TINY = 1e-140
 """Absolute rounding, where numbers underflow"""
 HUGE = 1e100
-"""Numbers beyond are refused: squares could overflow, and what is no number is never larger"""
+"""Larger numbers are refused, and NaN: squares could overflow, and NaN compares as false"""
 LONG: Any = np.longdouble if np.finfo(np.longdouble).nmant == 63 else np.float64
 """Extended precision, where the machine has it"""
 BLOCK = 4096
@@ -156,10 +156,11 @@ class Surface:
         values: Array = None,
         barriers: Array = (),
     ) -> None:
-        """Take (V, 3) positions or None, (F, 3) faces, and (F, 3) lengths or None, which count.
+        """Take (V, 3) positions or None, (F, 3) faces, and (F, 3) lengths or None.
 
-        No path crosses the ``barriers``, some of the faces. Faces at whose corners the ``values``
-        are infinite are left out as well: no path leads there.
+        Lengths, if given, are what distances are measured by. No path crosses the ``barriers``,
+        some of the faces. Faces at whose corners the ``values`` are infinite are left out as well:
+        no path leads there.
         """
         self.given = np.ascontiguousarray(faces, np.int64)
         refuse_unless(self.given.ndim == 2 and self.given.shape[1] == 3, "faces are no triangles")
@@ -169,7 +170,7 @@ class Surface:
         self.count = int(self.given.max()) + 1
         for per_vertex in (values, vertices):
             self.count = self.count if per_vertex is None else len(per_vertex)
-        refuse_unless(self.given.max() < self.count, "a face has a vertex that there is not")
+        refuse_unless(self.given.max() < self.count, "a face names a vertex that does not exist")
         shape = (self.count, 3) if lengths is None else self.given.shape
         refuse_unless(measures.shape == shape, "positions or lengths do not go with the faces")
         refuse_unless(
@@ -328,8 +329,8 @@ class Pieces:
         t0 = np.where(is_first, 0.0, np.roll(t1, 1))
         refuse_unless(bool((t1[is_last] == 1.0).all() and (t0 <= t1).all()), "pieces leave gaps")
         self.jumps = self._jumps(edge, a, h, sigma, t0, t1, is_first, is_last)
-        # Each end of an edge of one face stands in as a piece of no extent: there is nothing beyond
-        # such an edge, so that nobody needs f on it. The foot of the far end is rounded.
+        # On a boundary edge only f at its ends is needed, as no path crosses it. Each end stands in
+        # as a piece of no extent. The foot of the far end is rounded.
         rim = np.repeat(np.flatnonzero(is_rim), 2)
         side = np.tile([0.0, 1.0], len(rim) // 2)
         order = np.argsort(np.concatenate([edge, rim]), kind="stable")
@@ -358,9 +359,9 @@ class Pieces:
         is_first: Array,
         is_last: Array,
     ) -> Array:
-        """Return how far f may jump along each edge: between pieces, and at its ends.
+        """Return by how much f may jump along each edge: between pieces, and at its ends.
 
-        There are many pieces, and their roundings add up: so in extended precision.
+        There are many pieces, whose rounding adds up: hence extended precision.
         """
         surface, values = self.surface, self.values.astype(LONG)
         edges, length = surface.edges, surface.long_length[edge]
@@ -395,7 +396,10 @@ class Pieces:
         x0: Array,
         x1: Array,
     ) -> None:
-        """Raise ``worst[k]`` to the largest f - cone on [x0, x1] of edges g, from the lower end."""
+        """Raise ``worst[k]`` to bounds of f - cone on parts [x0, x1] of edges g.
+
+        The parts are measured from the lower vertex of an edge where ``low`` is set.
+        """
         length = self.surface.length.m[g]
         u0, u1 = np.clip(x0 / length, -1, 2), np.clip(x1 / length, -1, 2)
         u0, u1 = np.where(low, u0, 1 - u1), np.where(low, u1, 1 - u0)
@@ -420,8 +424,9 @@ class Pieces:
         """Bounds of f(q) - f(p) - |pq| for p on e and q on g, edges at a corner of each face.
 
         The least f(p) + |pq| is straight through a piece, or bends between two pieces where both
-        bend, or at the far end of e; at the corner itself the jumps of g say it. Where only one of
-        two neighbours bends at their common end, the other one is nearer, but for the jump there.
+        bend, or at the far end of e. At the corner itself the jumps along g bound it. Where only
+        one of two neighbours bends at their common end, the other is nearer, but for the jump
+        there.
         """
         number, worst = self.count[e], np.full(len(e), -np.inf)
         k = np.repeat(np.arange(len(e)), number)
@@ -465,7 +470,7 @@ class Proof(NamedTuple):
     lower: Array
     """(V,) lower bounds of the distances; infinite where no path leads from a source"""
     tau: Array
-    """(F,) by how much f may rise too fast in each face; 0 where no path comes"""
+    """(F,) bounds of tau; 0 for faces that are left out"""
 
 
 def prove(
@@ -493,7 +498,7 @@ def prove(
     _rise_from_sources(surface, function, sources, tau)
     tau = (tau + function.jumps[surface.of_face].sum(axis=1)) * UP
     values = function.values
-    # Only faces count that a path no longer than the value comes to.
+    # Only faces count that a path no longer than the value can reach.
     total = tau.sum() * (1 + 1e-9)
     least = values[surface.faces].max(axis=1) - surface.length.high[surface.of_face].max(axis=1)
     least = least - tau - 16 * U * (np.abs(least) + np.abs(values[surface.faces]).max(axis=1) + tau)
@@ -506,7 +511,7 @@ def prove(
     is_reached = np.zeros(surface.count, bool)
     is_reached[surface.faces] = True
     lower = np.where(is_reached, lower, np.inf)[surface.label]
-    for source in sources:  # a vertex of no face is where it is
+    for source in sources:  # a source may be a vertex of no face
         if source.vertex >= 0 and np.isinf(lower[source.vertex]):
             lower[source.vertex] = source.start
     refuse_unless(not np.isnan(lower).any() and not np.isnan(tau).any(), "a bound is no number")
