@@ -677,7 +677,8 @@ def main() -> int:
         paths = Paths(*(given[f"path_{name}"] for name in Paths._fields))
         ends, upper = measure(surface, options.source, paths)
     except (Refused, OSError, ValueError, KeyError, IndexError, BadZipFile) as error:
-        print(f"refused: {type(error).__name__}: {error}", file=sys.stderr)
+        kind = "" if isinstance(error, Refused) else f"{type(error).__name__}: "
+        print(f"refused: {kind}{error}", file=sys.stderr)
         return 1
     gaps, face = upper - proof.lower[ends], int(proof.tau.argmax())
     worst, largest = int(gaps.argmax()), upper.max()

@@ -319,7 +319,7 @@ def test_the_checker_proves_files_without_the_library(tmp_path):
     for wrong in (["--source", "1"], ["--source", "0", "--barriers", "2"]):
         refused = run_checker(tmp_path, "mesh.obj", "proof.npz", *wrong)
         assert refused.returncode == 1
-        assert refused.stderr.startswith("refused: ")
+        assert re.match(r"refused: [a-z]", refused.stderr)
 
 
 def test_the_checker_knows_lengths_and_barriers(tmp_path):
