@@ -114,6 +114,17 @@ class Control:
             self.progress(share)
         self._stop_if_due(share)
 
+    def finish(self) -> None:
+        """Report that the call, or the part of it, is done.
+
+        Examples
+        --------
+        >>> gc.Control(progress=print).finish()
+        1.0
+        """
+        if self.progress is not None:
+            self.progress(1.0)
+
     def watched(self, items: Iterable[T]) -> Iterator[T]:
         """Yield what a call prepares, and stop the call if it is to stop.
 

@@ -1372,8 +1372,7 @@ def _shortest_through(
             ) from None
         left -= leg.length
         legs.append(leg)
-    if control.progress is not None:
-        control.progress(1.0)
+    control.finish()
     return legs[0] if len(legs) == 1 else joined(legs)
 
 

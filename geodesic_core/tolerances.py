@@ -438,12 +438,12 @@ What moves by the mean of distances cannot be placed better than these are squar
 NARROW = 1e-6
 """Share of its edge: a stretch that is shorter may be a gap between windows, by rounding.
 
-In a certificate the windows beside it then meet, if the function jumps less that way. What is wrong
-by that is measured, and told. Seen: 1e-9.
+In a certificate the windows on both sides then meet, if the function jumps less that way. The error
+of that counts among the violations. Seen: gaps of 1e-9.
 """
 
 CERTIFIED = 1e-8
-"""Share of the largest distance: bounds of a certificate may differ by this and prove a field.
+"""Share of the largest distance by which bounds may miss distances that count as proved.
 
-Those of exact fields differ by 1e-12 to 1e-9, most of which is rounding in the proof.
+Bounds of exact fields miss them by 1e-12 to 1e-9, most of which is rounding in the proof.
 """

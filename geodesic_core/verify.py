@@ -11,13 +11,13 @@ its lower vertex, the pieces follow each other without gaps, t from 0 to 1. On a
 sigma + sqrt((x - a)^2 + h^2), where x = t * length. Each vertex has a value. Let tau of a face be
 at least f(q) - f(p) - |pq| for all p and q on its rim, and f(q) - c - |sq| for a source s in it
 that starts at c. A path from a source to a vertex v crosses faces. Each crossing raises f by its
-length and tau at most, and what lies between the first and the last crossing of a face is no
-shorter than the straight way. So the path is not shorter than f(v) less the sum of tau over all
-faces.
+length and tau at most. Where it crosses a face more than once, the straight way from the first
+point in the face to the last is no longer. So the path is at least f(v) less the sum of tau over
+all faces long.
 
-**Rounding.** Numbers of the mesh and of the file are exact as they stand. All that is computed from
-them is a ball, a midpoint and a radius, and the rounding of each operation goes into the radius.
-Only IEEE addition, multiplication, division and square root are relied on.
+**Rounding.** The numbers of the mesh and of the file are taken as exact. Whatever is computed from
+them is a ball: a midpoint and a radius, which takes in the rounding of each operation. Only IEEE
+addition, multiplication, division and square root are relied on.
 """
 
 import argparse
@@ -25,6 +25,7 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -35,7 +36,7 @@ UP = 1.0 + 2.0**-48
 TINY = 1e-140
 """Absolute rounding, where numbers underflow"""
 HUGE = 1e100
-"""Numbers beyond are refused: squares could overflow, and what is no number is never larger"""
+"""Larger numbers are refused, and NaN: squares could overflow, and NaN compares as false"""
 LONG: Any = np.longdouble if np.finfo(np.longdouble).nmant == 63 else np.float64
 """Extended precision, where the machine has it"""
 BLOCK = 4096
@@ -157,24 +158,29 @@ class Surface:
     ) -> None:
         """Take (V, 3) positions or None, (F, 3) faces, and (F, 3) lengths or None.
 
-        No path crosses the ``barriers``, some of the faces. Faces at whose corners the ``values``
-        are infinite are left out as well: no path leads there.
+        Lengths, if given, are what distances are measured by. No path crosses the ``barriers``,
+        some of the faces. Faces at whose corners the ``values`` are infinite are left out as well:
+        no path leads there.
         """
         self.given = np.ascontiguousarray(faces, np.int64)
         refuse_unless(self.given.ndim == 2 and self.given.shape[1] == 3, "faces are no triangles")
         refuse_unless(self.given.size > 0 and self.given.min() >= 0, "there are no faces")
-        self.vertices = None if vertices is None else np.asarray(vertices, np.float64)
-        self.count = int(self.given.max()) + 1 if vertices is None else len(vertices)
-        if values is not None and np.shape(values) == (max(self.count, len(values)),):
-            self.count = len(values)
-        refuse_unless(self.given.max() < self.count, "a face has a vertex that there is not")
-        measures: Any = self.vertices if lengths is None else np.asarray(lengths, np.float64)
+        measures = np.asarray(vertices if lengths is None else lengths, np.float64)
+        self.vertices = measures if lengths is None else None
+        self.count = int(self.given.max()) + 1
+        for per_vertex in (values, vertices):
+            self.count = self.count if per_vertex is None else len(per_vertex)
+        refuse_unless(self.given.max() < self.count, "a face names a vertex that does not exist")
+        shape = (self.count, 3) if lengths is None else self.given.shape
+        refuse_unless(measures.shape == shape, "positions or lengths do not go with the faces")
         refuse_unless(
             bool((np.abs(measures) <= HUGE).all()), "a number of the mesh is out of range"
         )
-        self.label = self._labels(lengths)
+        self.label = self._labels(measures)
         faces = self.label[self.given]
-        is_open = np.zeros(faces.shape, bool) if values is None else np.isinf(values[faces])
+        values = np.zeros(self.count) if values is None else _numbers(values)
+        refuse_unless(values.shape == (self.count,), "there is not one value a vertex")
+        is_open = np.isposinf(values[faces])
         barriers = np.asarray(barriers, np.int64)
         refuse_unless(bool(np.isin(barriers, np.arange(len(faces))).all()), "a barrier is no face")
         is_open[barriers] = False
@@ -185,7 +191,6 @@ class Surface:
         is_kept[barriers] = False
         self.kept = np.flatnonzero(is_kept)
         self.faces = faces[self.kept]
-        refuse_unless(len(self.faces) > 0, "no face is reached")
         ends = np.sort(np.stack([self.faces, np.roll(self.faces, -1, axis=1)], axis=2), axis=2)
         keys = ends[..., 0] * self.count + ends[..., 1]
         _, first, of_face = np.unique(keys.ravel(), return_index=True, return_inverse=True)
@@ -196,7 +201,7 @@ class Surface:
             step = difference(place[:, 1], place[:, 0])
             self.long_length = norm(*(step[:, k] for k in range(3)))
         else:
-            given = np.asarray(lengths, np.float64)[self.kept]
+            given = measures[self.kept]
             refuse_unless(
                 bool((given.ravel()[first][of_face] == given.ravel()).all()), "two lengths"
             )
@@ -205,14 +210,13 @@ class Surface:
         self.length = Ball(m, (self.long_length.r.astype(float) + U * m) * UP)
         refuse_unless(bool((self.length.low > 0).all()), "an edge has no length")
 
-    def _labels(self, lengths: Array) -> Array:
+    def _labels(self, measures: Array) -> Array:
         """Return for each vertex the lowest of those joined to it by edges of no length."""
         label = np.arange(self.count)
         tail, head = self.given.ravel(), np.roll(self.given, -1, axis=1).ravel()
-        if lengths is None and self.vertices is not None:
-            joined = (self.vertices[tail] == self.vertices[head]).all(axis=1)
-        else:
-            joined = np.asarray(lengths).ravel() == 0.0
+        joined = measures.ravel() == 0.0
+        if self.vertices is not None:
+            joined = (measures[tail] == measures[head]).all(axis=1)
         tail, head = tail[joined], head[joined]
         while (label[tail] != label[head]).any():
             lowest = np.minimum(label[tail], label[head])
@@ -298,12 +302,11 @@ class Pieces:
     def __init__(self, surface: Surface, given: dict[str, Array]) -> None:
         """Take the arrays of a file, and refuse what is no function on the edges of the surface."""
         self.surface, edges, is_rim = surface, surface.edges, surface.is_rim
-        try:
-            names = ("a", "h", "sigma", "t", "values")
-            a, h, sigma, t1, values = (np.asarray(given[name], np.float64) for name in names)
-            count = np.asarray(given["pieces"], np.int64)
-        except (KeyError, TypeError, ValueError) as error:
-            raise Refused(f"the file has no function on the edges: {error}") from None
+        names = ("values", "pieces", "a", "h", "sigma", "t")
+        refuse_unless(given.keys() >= set(names), "the file has no function on the edges")
+        values, pieces, a, h, sigma, t1 = (_numbers(given[name]) for name in names)
+        refuse_unless(bool((np.abs(pieces) <= 1e9).all()), "a number of pieces is out of range")
+        count = pieces.astype(np.int64)
         refuse_unless(values.shape == (surface.count,), "there is not one value a vertex")
         refuse_unless(count.shape == (len(edges),), "there is not one number of pieces an edge")
         refuse_unless(
@@ -326,8 +329,8 @@ class Pieces:
         t0 = np.where(is_first, 0.0, np.roll(t1, 1))
         refuse_unless(bool((t1[is_last] == 1.0).all() and (t0 <= t1).all()), "pieces leave gaps")
         self.jumps = self._jumps(edge, a, h, sigma, t0, t1, is_first, is_last)
-        # Each end of an edge of one face stands in as a piece of no extent: there is nothing beyond
-        # such an edge, so that nobody needs f on it. The foot of the far end is rounded.
+        # On a boundary edge only f at its ends is needed, as no path crosses it. Each end stands in
+        # as a piece of no extent. The foot of the far end is rounded.
         rim = np.repeat(np.flatnonzero(is_rim), 2)
         side = np.tile([0.0, 1.0], len(rim) // 2)
         order = np.argsort(np.concatenate([edge, rim]), kind="stable")
@@ -356,9 +359,9 @@ class Pieces:
         is_first: Array,
         is_last: Array,
     ) -> Array:
-        """Return how far f may jump along each edge: between pieces, and at its ends.
+        """Return by how much f may jump along each edge: between pieces, and at its ends.
 
-        There are many pieces, and their roundings add up: so in extended precision.
+        There are many pieces, whose rounding adds up: hence extended precision.
         """
         surface, values = self.surface, self.values.astype(LONG)
         edges, length = surface.edges, surface.long_length[edge]
@@ -393,7 +396,10 @@ class Pieces:
         x0: Array,
         x1: Array,
     ) -> None:
-        """Raise ``worst[k]`` to the largest f - cone on [x0, x1] of edges g, from the lower end."""
+        """Raise ``worst[k]`` to bounds of f - cone on parts [x0, x1] of edges g.
+
+        The parts are measured from the lower vertex of an edge where ``low`` is set.
+        """
         length = self.surface.length.m[g]
         u0, u1 = np.clip(x0 / length, -1, 2), np.clip(x1 / length, -1, 2)
         u0, u1 = np.where(low, u0, 1 - u1), np.where(low, u1, 1 - u0)
@@ -418,8 +424,9 @@ class Pieces:
         """Bounds of f(q) - f(p) - |pq| for p on e and q on g, edges at a corner of each face.
 
         The least f(p) + |pq| is straight through a piece, or bends between two pieces where both
-        bend, or at the far end of e; at the corner itself the jumps of g say it. Where only one of
-        two neighbours bends at their common end, the other one is nearer, but for the jump there.
+        bend, or at the far end of e. At the corner itself the jumps along g bound it. Where only
+        one of two neighbours bends at their common end, the other is nearer, but for the jump
+        there.
         """
         number, worst = self.count[e], np.full(len(e), -np.inf)
         k = np.repeat(np.arange(len(e)), number)
@@ -449,13 +456,21 @@ class Pieces:
         return worst
 
 
+def _numbers(given: Array) -> Array:
+    """Return an array of a file as numbers in double precision."""
+    try:
+        return np.asarray(given, np.float64)
+    except (TypeError, ValueError):
+        raise Refused("an array holds something else than numbers") from None
+
+
 class Proof(NamedTuple):
     """What a certificate proves."""
 
     lower: Array
     """(V,) lower bounds of the distances; infinite where no path leads from a source"""
     tau: Array
-    """(F,) by how much f may rise too fast in each face; 0 where no path comes"""
+    """(F,) bounds of tau; 0 for faces that are left out"""
 
 
 def prove(
@@ -483,7 +498,7 @@ def prove(
     _rise_from_sources(surface, function, sources, tau)
     tau = (tau + function.jumps[surface.of_face].sum(axis=1)) * UP
     values = function.values
-    # Only faces count that a path no longer than the value comes to.
+    # Only faces count that a path no longer than the value can reach.
     total = tau.sum() * (1 + 1e-9)
     least = values[surface.faces].max(axis=1) - surface.length.high[surface.of_face].max(axis=1)
     least = least - tau - 16 * U * (np.abs(least) + np.abs(values[surface.faces]).max(axis=1) + tau)
@@ -496,7 +511,7 @@ def prove(
     is_reached = np.zeros(surface.count, bool)
     is_reached[surface.faces] = True
     lower = np.where(is_reached, lower, np.inf)[surface.label]
-    for source in sources:  # a vertex of no face is where it is
+    for source in sources:  # a source may be a vertex of no face
         if source.vertex >= 0 and np.isinf(lower[source.vertex]):
             lower[source.vertex] = source.start
     refuse_unless(not np.isnan(lower).any() and not np.isnan(tau).any(), "a bound is no number")
@@ -559,7 +574,7 @@ def measure(surface: Surface, sources: list[Source], paths: Paths) -> tuple[Arra
     """Return the vertices at which paths end, and upper bounds of their distances."""
     first, faces = (np.asarray(array, np.int64) for array in (paths.first, paths.faces))
     ends = [np.asarray(array, np.float64) for array in (paths.tails, paths.heads)]
-    refuse_unless(first.ndim == 1 and len(first) > 0 and first[0] == 0, "paths begin nowhere")
+    refuse_unless(first.ndim == 1 and len(first) > 1 and first[0] == 0, "there are no paths")
     refuse_unless(bool((np.diff(first) > 0).all()) and first[-1] == len(faces), "a path has no end")
     row = np.full(len(surface.given), -1)
     row[surface.kept] = np.arange(len(surface.kept))
@@ -661,8 +676,9 @@ def main() -> int:
         proof = prove(surface, options.source, given)
         paths = Paths(*(given[f"path_{name}"] for name in Paths._fields))
         ends, upper = measure(surface, options.source, paths)
-    except (Refused, OSError, ValueError, KeyError) as error:
-        print(f"refused: {error}", file=sys.stderr)
+    except (Refused, OSError, ValueError, KeyError, IndexError, BadZipFile) as error:
+        kind = "" if isinstance(error, Refused) else f"{type(error).__name__}: "
+        print(f"refused: {kind}{error}", file=sys.stderr)
         return 1
     gaps, face = upper - proof.lower[ends], int(proof.tau.argmax())
     worst, largest = int(gaps.argmax()), upper.max()

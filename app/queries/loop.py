@@ -16,7 +16,7 @@ from app.queries.cost_model import (
 from app.queries.lines import OFFERS, are_located, count_values, describe_line
 from app.queries.points import SurfacePoints, points_in_curves, split_points, to_curves
 from app.queries.validation import WrittenPoints, invalid_fields, naming
-from app.queries.views import lines_of_loops
+from app.queries.views import lines_of_curves
 from app.schemas.requests import Accuracy, LoopRequest
 from app.store.meshes import OpenMesh
 
@@ -60,7 +60,7 @@ class LoopQuery(Query[LoopRequest]):
             members,
             shown=("lines",),
             values=count_values(loops, located=located),
-            lines=lambda: lines_of_loops(found, located=located),
+            lines=lambda: lines_of_curves(found, "line", located=located),
         )
 
     def _loops(

@@ -97,29 +97,27 @@ def lines_of_borders(borders: Sequence[Mapping[str, Any]], *, located: bool) -> 
 
 def lines_of_boundaries(curves: Sequence[Mapping[str, Any]], *, located: bool) -> list[Line]:
     """Return boundaries as lines with their vertices, or a line without points for none."""
-    lines = []
-    for i, curve in enumerate(curves or [{"vertices": (), **_no_line(located=located)}]):
-        number = i if curves else None
-        about = {"line": number, "closed": curve["closed"], "length": curve["length"]}
-        line = polyline(curve, about, f"boundary_{i}")
-        columns = {"vertex": curve["vertices"], **line.at_points}
-        lines.append(replace(line, at_points=columns))
-    return lines
+    lines = lines_of_curves(curves, "boundary", located=located)
+    given = curves or [{"vertices": ()}]
+    return [
+        replace(line, at_points={"vertex": curve["vertices"], **line.at_points})
+        for line, curve in zip(lines, given, strict=True)
+    ]
 
 
-def lines_of_loops(loops: Sequence[Mapping[str, Any]], *, located: bool) -> list[Line]:
-    """Return loops and straightened curves as lines, or a line without points for none."""
+def lines_of_curves(curves: Sequence[Mapping[str, Any]], name: str, *, located: bool) -> list[Line]:
+    """Return curves as lines of this name, or a line without points for none."""
     return [
         polyline(
-            loop,
+            curve,
             {
-                "line": i if loops else None,
-                "closed": loop["closed"],
-                "length": loop["length"],
+                "line": i if curves else None,
+                "closed": curve["closed"],
+                "length": curve["length"],
             },
-            f"line_{i}",
+            f"{name}_{i}",
         )
-        for i, loop in enumerate(loops or [_no_line(located=located)])
+        for i, curve in enumerate(curves or [_no_line(located=located)])
     ]
 
 

@@ -124,18 +124,24 @@ class Step:
     """The faces that were visited"""
 
 
-@dataclass(frozen=True)
-class Isoline:
-    """A line of points at one distance, or of one value."""
+@dataclass(frozen=True, kw_only=True)
+class Line:
+    """A line on the surface."""
 
     points: Floats
-    """(K, 3), or (0, 3) on a mesh without positions, as for all lines"""
+    """(K, 3), or (0, 3) on a mesh without positions"""
     faces: Integers
+    """The face of each piece"""
     closed: bool
     length: float
     locations: Sequence[Mapping[str, Any]] = ()
     """Its points, each as a face and the weights of its corners: where they were asked for, and on
     a mesh without positions"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Isoline(Line):
+    """A line of points at one distance, or of one value."""
 
 
 @dataclass(frozen=True)
@@ -155,48 +161,25 @@ class Isolines:
     error_bound: ErrorBound
 
 
-@dataclass(frozen=True)
-class Border:
+@dataclass(frozen=True, kw_only=True)
+class Border(Line):
     """A line of points that are equally near to two sources, and no nearer to a third."""
 
     sources: tuple[int, int]
     """The two sources whose territories it separates: indices of the request, the lower first"""
-    points: Floats
-    faces: Integers
-    closed: bool
-    length: float
-    locations: Sequence[Mapping[str, Any]] = ()
-    """Its points, each as a face and the weights of its corners: where they were asked for, and on
-    a mesh without positions"""
 
 
-@dataclass(frozen=True)
-class Boundary:
+@dataclass(frozen=True, kw_only=True)
+class Boundary(Line):
     """A line along edges that have one face, with the surface on its left."""
 
     vertices: Integers
     """(K,)"""
-    points: Floats
-    faces: Integers
-    closed: bool
-    length: float
-    locations: Sequence[Mapping[str, Any]] = ()
-    """Its points, each as a face and the weights of its corners: where they were asked for, and on
-    a mesh without positions"""
 
 
-@dataclass(frozen=True)
-class Loop:
-    """A loop that cannot be shrunk to a point, or a curve pulled tight."""
-
-    points: Floats
-    faces: Integers
-    closed: bool
-    """False for an open curve that was pulled tight"""
-    length: float
-    locations: Sequence[Mapping[str, Any]] = ()
-    """Its points, each as a face and the weights of its corners: where they were asked for, and on
-    a mesh without positions"""
+@dataclass(frozen=True, kw_only=True)
+class Loop(Line):
+    """A loop that cannot be shrunk to a point, or a curve pulled tight, which may be open."""
 
 
 @dataclass(frozen=True)
@@ -471,7 +454,7 @@ def to_isolines(response: httpx2.Response) -> Isolines:
 def to_borders(response: httpx2.Response) -> list[Border]:
     """Return borders."""
     return [
-        Border((line["sources"][0], line["sources"][1]), **_members_of(line))
+        Border(sources=(line["sources"][0], line["sources"][1]), **_members_of(line))
         for line in response.json()["borders"]
     ]
 
@@ -479,7 +462,7 @@ def to_borders(response: httpx2.Response) -> list[Border]:
 def to_boundaries(response: httpx2.Response) -> list[Boundary]:
     """Return boundaries."""
     return [
-        Boundary(np.array(line["vertices"], np.int64), **_members_of(line))
+        Boundary(vertices=np.array(line["vertices"], np.int64), **_members_of(line))
         for line in response.json()["boundaries"]
     ]
 

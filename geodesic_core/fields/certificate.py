@@ -26,7 +26,6 @@ from geodesic_core.kernels.certificates.edge_functions import (
     edge_function,
 )
 from geodesic_core.kernels.front import window
-from geodesic_core.kernels.front.window import B0, B1, SX, SY
 from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.retained.face_windows import FaceWindows, face_windows_of
@@ -45,9 +44,9 @@ _TOGETHER = 2048
 class Certificate:
     """Proved bounds of the distances of a field, and what proves them.
 
-    The lower bounds are proved by a function on the edges, see `geodesic_core.verify`; the upper
-    ones are lengths of paths. Both hold to the last bit for the mesh as its numbers say, whatever
-    the solver has done.
+    The lower bounds are proved by a function on the edges, see `geodesic_core.verify`. The upper
+    bounds are lengths of paths. Both are proved with all rounding counted, for the mesh as its
+    numbers say, and do not rely on the solver.
 
     Examples
     --------
@@ -63,7 +62,8 @@ class Certificate:
     upper: Floats
     """(V,) mesh units: lengths of paths, start distances counted; infinite where none leads."""
     violations: Floats
-    """(F,) mesh units: by how much the function may rise too fast in each face, 0 or rounding."""
+    """(F,) mesh units: by how much the function on the edges may rise faster than distances can,
+    across each face; 0 or rounding."""
     holds: bool
     """Whether the distances of the field are proved: that exact ones are, and that approximate ones
     are within their error, and no longer than exact ones; to 1e-8 of the largest distance."""
@@ -80,12 +80,12 @@ class Certificate:
 
     @property
     def worst_face(self) -> int:
-        """The face in which the function rises most too fast."""
+        """The face of the largest violation."""
         return int(self.violations.argmax())
 
     @property
     def worst_violation(self) -> float:
-        """By how much it does there, mesh units."""
+        """The largest violation, mesh units."""
         return float(self.violations[self.worst_face])
 
     def save(self, path: str | Path) -> None:
@@ -130,7 +130,7 @@ def certified(sweep: Sweep, result: SweepResult, control: Control) -> Certificat
     """
     if not isinstance(sweep, WholeSweep):
         raise InvalidArgument(
-            "a fast field has no certificate, as its windows leave parts of edges dark: certify an "
+            "a fast field has no certificate, as its windows do not cover the edges: certify an "
             "exact or an approximate one"
         )
     whole, question = sweep, sweep.question
@@ -165,8 +165,7 @@ def certified(sweep: Sweep, result: SweepResult, control: Control) -> Certificat
     most = whole.upper_bounds(values[reached])
     values, lower, high = (array[reached] for array in (values, proof.lower, upper))
     holds = bool((values - lower <= slack).all() and (high - most <= slack).all())
-    if control.progress is not None:
-        control.progress(1.0)
+    control.finish()
     return Certificate(mesh, proof.lower, upper, proof.tau, holds, arrays | paths)
 
 
@@ -218,11 +217,12 @@ def _cones_of_windows(
     edge = _edges_between(surface, tail, head)
     length, is_turned = surface.length.m[edge], tail > head
     cones = np.empty((len(rows), CONE))
-    cones[:, FOOT] = np.where(is_turned, length - rows[:, SX], rows[:, SX])
-    cones[:, HEIGHT], cones[:, SIGMA] = np.abs(rows[:, SY]), rows[:, window.SIGMA]
-    begin = np.where(is_turned, length - rows[:, B1], rows[:, B0])
-    end = np.where(is_turned, length - rows[:, B0], rows[:, B1])
-    cones[:, LOW], cones[:, HIGH] = begin, end
+    sx = rows[:, window.SX]
+    cones[:, FOOT] = np.where(is_turned, length - sx, sx)
+    cones[:, HEIGHT], cones[:, SIGMA] = np.abs(rows[:, window.SY]), rows[:, window.SIGMA]
+    b0, b1 = rows[:, window.B0], rows[:, window.B1]
+    cones[:, LOW] = np.where(is_turned, length - b1, b0)
+    cones[:, HIGH] = np.where(is_turned, length - b0, b1)
     return edge, cones
 
 
@@ -292,7 +292,6 @@ def _paths_to(
     """Return the paths to some vertices, by weights in the faces that they cross."""
     mesh = question.mesh
     first, faces, at, weights = [0], [np.empty(0, np.int32)], [], []
-    corners = surface.label[mesh.faces]
     for v in control.watched(mesh.topology.inner_vertex[ends].tolist()):
         located, crossed = located_path(mesh, winners, question.nodes, v)
         first.append(first[-1] + len(crossed))
@@ -302,7 +301,8 @@ def _paths_to(
     crossed = np.concatenate(faces)
     points = np.concatenate(at, axis=1) if at else np.empty((2, 0), np.int32)
     shares = np.concatenate(weights, axis=1) if at else np.empty((2, 0, 3))
-    sides = (_weights_in(corners[crossed], corners[points[k]], shares[k]) for k in (0, 1))
+    corners, given = surface.label[mesh.faces[crossed]], surface.label[mesh.faces[points]]
+    sides = (_weights_in(corners, given[k], shares[k]) for k in (0, 1))
     return verify.Paths(np.array(first), crossed, *sides)
 
 

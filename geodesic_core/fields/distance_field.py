@@ -642,8 +642,7 @@ class DistanceField:
             part = control.for_part(1 + i, parts)
             reached = level <= self.max_distance
             yield drawing.lines(min(level, highest), chord_error, part) if reached else []
-        if control.progress is not None:
-            control.progress(1.0)
+        control.finish()
 
     def log_map(
         self,
@@ -815,8 +814,7 @@ class DistanceField:
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
         borders = self._borders(resolve_chord_error(self.mesh, chord_error), control)
-        if control.progress is not None:
-            control.progress(1.0)
+        control.finish()
         return borders
 
     def _borders(self, error: float, control: Control) -> list[Border]:

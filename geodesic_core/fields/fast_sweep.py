@@ -94,8 +94,7 @@ class FastSweep:
         if nodes.has_site_targets:
             sweep.reach_sites_inside(topology, wave, limits, nodes.first_target)
         wave.vertices.distance[wave.vertices.distance > question.max_distance] = np.inf
-        if control.progress is not None:
-            control.progress(1.0)
+        control.finish()
         return wave
 
     def upper_bounds(self, distances: Floats) -> None:

@@ -77,7 +77,7 @@ class StraightLine(GeodesicPath):
     """What it ends at: ``"length"``, as long as asked for; ``"boundary"``; ``"barrier"``;
     ``"vertex"``, where lines were to end there; ``"non_manifold"``, an edge of three faces or more,
     or a vertex where several fans of faces meet; ``"collapsed"``, faces without
-    area, in which it would circle on a spot"""
+    area, in which it would circle on one spot for ever"""
     end_direction: float
     """Direction in which it would go on, radians in the frame of its last point; NaN where that has
     no tangent plane"""
@@ -182,8 +182,7 @@ def _traced(
         done, count = trace_lines(mesh.topology, ints, floats, done, stops, trail)
         trails.append([array[:count].copy() for array in trail])
         size += sum(array.nbytes for array in trails[-1])
-    if control.progress is not None:
-        control.progress(1.0)
+    control.finish()
     arrays: list[Any] = [np.concatenate(parts) for parts in zip(*trails, strict=True)]
     return Trail(*arrays)
 

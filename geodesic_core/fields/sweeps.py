@@ -129,8 +129,7 @@ class WholeSweep(ABC):
         wave = sweep_nodes(mesh, wave, nodes, starts, bounds, control, share)
         control.check_memory(peak_bytes(wave))
         wave.vertices.distance[wave.vertices.distance > limit] = math.inf
-        if control.progress is not None:
-            control.progress(1.0)
+        control.finish()
         return wave
 
     def find_windows(self, faces: Flags, control: Control) -> FaceWindows:

@@ -77,8 +77,7 @@ def find_matrix(
             table.values[i] = _searched(finder, source_points[i], target_points[i], limit, part)
         rest = control.for_part(few, parts, len(table.sweeps)).holding(finder.nbytes)
     fill(table, mesh, table.ends, limit, sweep_of, most, rest, workspace.target_sweep)
-    if control.progress is not None:
-        control.progress(1.0)
+    control.finish()
     return table.result()
 
 

@@ -199,8 +199,7 @@ def write_matrix(
         written = MatrixFile(path, plan.shape, bound, sha256_of(path), len(sink.sweeps))
         _write_beside(path, facts | {"sha256": written.sha256})
         blocks.remove()
-    if control.progress is not None:
-        control.progress(1.0)
+    control.finish()
     return written
 
 

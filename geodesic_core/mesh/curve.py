@@ -58,7 +58,7 @@ def polyline_of(mesh: "TriangleMesh", curve: Curve, name: str, control: Control)
     if not points:
         raise InvalidArgument(f"{name} is a curve without points; give at least one")
     for i, (start, end) in enumerate(control.watched(pairwise(points))):
-        if not _share_a_face(mesh, start, end):
+        if shared_face(mesh, start, end) is None:
             raise InvalidPoint(
                 f"the points {i} and {i + 1} of {name}, {start} and {end}, have no face in common; "
                 "add the points where the curve crosses edges: a shortest path has them"
@@ -95,22 +95,16 @@ def share_a_face(mesh: "TriangleMesh", start: Point, end: Point) -> bool:
     >>> gc.share_a_face(mesh, 1, 3)
     False
     """
-    return _share_a_face(mesh, mesh.point(start, "start"), mesh.point(end, "end"))
+    ends = mesh.point(start, "start"), mesh.point(end, "end")
+    return shared_face(mesh, *ends) is not None
 
 
-def _share_a_face(mesh: "TriangleMesh", start: SurfacePoint, end: SurfacePoint) -> bool:
-    """Tell the same of canonical points."""
-    if start == end:
-        return True
-    return bool(weights_by_face(mesh, start).keys() & weights_by_face(mesh, end))
-
-
-def shared_face(mesh: "TriangleMesh", start: SurfacePoint, end: SurfacePoint) -> int:
-    """Return the lowest face that two canonical points have in common."""
+def shared_face(mesh: "TriangleMesh", start: SurfacePoint, end: SurfacePoint) -> int | None:
+    """Return the lowest face that two canonical points have in common; None if they have none."""
     if start == end:
         return start.face_index
     shared = weights_by_face(mesh, start).keys() & weights_by_face(mesh, end)
-    return int(mesh.topology.outer_face[list(shared)].min())
+    return int(mesh.topology.outer_face[list(shared)].min()) if shared else None
 
 
 def curve_on(mesh: "TriangleMesh", points: Sequence[Point], *, closed: bool) -> SurfaceCurve:
@@ -124,7 +118,7 @@ def curve_on(mesh: "TriangleMesh", points: Sequence[Point], *, closed: bool) -> 
         One is not a point of the mesh or lies in blocked faces only, or two share no face.
     """
     stops = polyline_of(mesh, Curve(points), "the curve", Control())
-    if closed and not _share_a_face(mesh, stops[-1], stops[0]):
+    if closed and shared_face(mesh, stops[-1], stops[0]) is None:
         raise InvalidPoint(f"no face holds the last point, {stops[-1]}, and the first, {stops[0]}")
     stops = (*stops, stops[0]) if closed else stops
     faces = np.array([point.face_index for point in stops], np.int32)

@@ -98,8 +98,7 @@ def spread_points(
         node = int(topology.inner_vertex[vertex])
         wave = add_source(mesh, wave, node, len(found), bounds, silent)
         found.append(mesh.point(vertex))
-    if control.progress is not None:
-        control.progress(1.0)
+    control.finish()
     wave.vertices.distance[: len(mesh.vertices)][in_no_face] = np.inf
     distances, inner = wave.vertices.distance, topology.inner_vertex
     nearest = nearest_sources(distances, wave.vertices.winner_ints, wave.vertices.source_index)

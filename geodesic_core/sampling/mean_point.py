@@ -81,8 +81,7 @@ def find_mean(
         converged = after is None
         if after is not None:
             mean, moves = after, moves + 1
-    if control.progress is not None:
-        control.progress(1.0)
+    control.finish()
     return MeanPoint(mean.sources[0], _variance(mean, weights), converged, moves)
 
 

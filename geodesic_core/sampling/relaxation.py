@@ -82,8 +82,7 @@ def relaxed_points(
         costs.append(min(cost, costs[-1]))
         if converged:
             break
-    if control.progress is not None:
-        control.progress(1.0)
+    control.finish()
     return RelaxedPoints(
         mesh, charts.sources, np.array(costs), converged, charts.distances, charts.nearest
     )

@@ -57,8 +57,7 @@ def find_nearest(
         order = _nearest_first(reached)[:count]
         order = order[np.isfinite(reached[order])]
         indices, distances = connected[order], reached[order]
-    if control.progress is not None:
-        control.progress(1.0)
+    control.finish()
     return Nearest(indices, distances)
 
 

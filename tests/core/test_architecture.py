@@ -22,7 +22,17 @@ PARTS = [
     "mesh",
 ]
 PARTS += ["plotting"]
-KERNELS = ["borders", "isolines", "retained", "curves", "paths", "sweep", "fast", "front"]
+KERNELS = [
+    "borders",
+    "certificates",
+    "isolines",
+    "retained",
+    "curves",
+    "paths",
+    "sweep",
+    "fast",
+    "front",
+]
 MODULES = {f"geodesic_core.{part}": part for part in PARTS}
 MODULES |= {f"geodesic_core.kernels.{room}": room for room in KERNELS}
 MODULES |= {

@@ -1,10 +1,10 @@
 """The function on the edges of a certificate: the lower envelope of the cones over each of them.
 
-A cone is σ + √((x - a)² + h²), x mesh units from the edge's lower vertex. Windows on the edge, from
-each of its faces, are cones within their ends; the distance of an end of the edge is one all along.
+A cone is σ + √((x - a)² + h²), x mesh units from the edge's lower vertex. Each window on the edge,
+from any of its faces, is a cone between its ends. So is the way along the edge from either end of
+it, over its whole length.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from geodesic_core.kernels.borders.envelopes import REGION, START, envelope_alon
 from geodesic_core.kernels.curves.regions import SIDES_END, put_disc, put_side
 from geodesic_core.kernels.curves.rows import with_room
 from geodesic_core.kernels.jit import inlined, kernel
+from geodesic_core.kernels.planar import distance
 from geodesic_core.tolerances import NARROW
 
 # Columns of a cone
@@ -47,7 +48,7 @@ def edge_function(first: Longs, cones: Floats, lengths: Floats) -> EdgeFunction:
     Those of edge e are rows ``first[e]`` to ``first[e + 1]``; an edge without cones has no pieces.
     """
     counts = np.zeros(len(lengths), np.int32)
-    rows, ends, total = np.empty((2 * len(cones), 1), np.int64), np.empty((2 * len(cones), 1)), 0
+    rows, ends, total = np.empty(2 * len(cones), np.int64), np.empty(2 * len(cones)), 0
     regions, labels = np.zeros((1, SIDES_END)), np.zeros(1, np.int32)
     for e in range(len(lengths)):
         base, number = first[e], first[e + 1] - first[e]
@@ -60,22 +61,17 @@ def edge_function(first: Longs, cones: Floats, lengths: Floats) -> EdgeFunction:
         of_edge = Regions(regions[:number], labels[:number], 0.0, 0.0)
         stretches = envelope_along(of_edge, (0.0, 0.0, 1.0, 0.0), lengths[e])
         stretches = without_gaps(stretches, cones[base : base + number], lengths[e])
-        counts[e] = len(stretches)
-        rows, ends = (
-            with_room(rows, total + len(stretches)),
-            with_room(ends, total + len(stretches)),
-        )
+        counts[e], needed = len(stretches), total + len(stretches)
+        rows, ends = with_room(rows, needed), with_room(ends, needed)
         for k in range(len(stretches)):
-            rows[total, 0] = base + int(stretches[k, REGION])
-            ends[total, 0] = lengths[e]
+            rows[total], ends[total] = base + int(stretches[k, REGION]), lengths[e]
             if k > 0:
-                place = stretches[k, START]
-                near = NARROW * lengths[e]
-                place = crossing_near(cones, rows[total - 1, 0], rows[total, 0], place, near)
-                before = ends[total - 2, 0] if k > 1 else 0.0
-                ends[total - 1, 0] = min(max(place, before), lengths[e])
+                place, near = stretches[k, START], NARROW * lengths[e]
+                place = crossing_near(cones, rows[total - 1], rows[total], place, near)
+                before = ends[total - 2] if k > 1 else 0.0
+                ends[total - 1] = min(max(place, before), lengths[e])
             total += 1
-    return EdgeFunction(counts, rows[:total, 0].copy(), ends[:total, 0].copy())
+    return EdgeFunction(counts, rows[:total].copy(), ends[:total].copy())
 
 
 @inlined
@@ -88,9 +84,9 @@ def put_cone(region: Floats, cone: Floats) -> None:
 
 @kernel
 def without_gaps(stretches: Floats, cones: Floats, length: float) -> Floats:
-    """Return an envelope without short stretches by which it jumps. Modifies the array.
+    """Return an envelope without short stretches that it jumps to. Modifies the array.
 
-    Rounding leaves gaps between windows, in which the envelope is that of what lies behind.
+    Rounding leaves gaps between neighbouring windows, where some farther cone is the nearest.
     """
     total, count, k = len(stretches), min(1, len(stretches)), 1
     while k < total:
@@ -143,11 +139,11 @@ def crossing_near(cones: Floats, i: int, j: int, place: float, near: float) -> f
 @inlined
 def cone_at(cones: Floats, i: int, place: float) -> float:
     """Return the value of a cone."""
-    return cones[i, SIGMA] + math.hypot(place - cones[i, FOOT], cones[i, HEIGHT])
+    return cones[i, SIGMA] + distance(place, cones[i, FOOT], cones[i, HEIGHT])
 
 
 @inlined
 def slope_at(cones: Floats, i: int, place: float) -> float:
-    """Return by how much a cone rises; 0 at its apex."""
-    away = math.hypot(place - cones[i, FOOT], cones[i, HEIGHT])
+    """Return the derivative of a cone along the edge; 0 at its apex."""
+    away = distance(place, cones[i, FOOT], cones[i, HEIGHT])
     return (place - cones[i, FOOT]) / away if away > 0.0 else 0.0

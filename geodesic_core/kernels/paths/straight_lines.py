@@ -46,14 +46,14 @@ AT_LENGTH = 1
 AT_BOUNDARY = 2
 AT_VERTEX = 3  # lines are to end at vertices
 AT_NON_MANIFOLD = 4  # an edge of several faces, or a vertex where several fans meet
-AT_COLLAPSED = 5  # it circles in faces without area, on a spot
+AT_COLLAPSED = 5  # it circles on one spot, in faces without area
 
 # Columns of the state of lines, a row each
 VERTEX = 0  # int: the line is at this vertex; -1 where it is on a half-edge
 HALF_EDGE = 1  # int: the line is on it, about to cross its face
 STOP = 2  # int: see above
 PASSED = 3  # int: edges and vertices that the line has passed
-STILL = 4  # int: of these, how many since it last had less to go
+STILL = 4  # int: how many of these since it last moved
 INTS = 5
 ANGLE = 0  # float: at a vertex, the direction in its unfolded fan, radians
 X = 1  # float: on a half-edge, the position in its frame
@@ -177,7 +177,7 @@ def pass_face(
         ints[i, STILL] = ints[i, STILL] + 1 if line.left == floats[i, LEFT] else 0
         if v >= 0:
             line = through_vertex(topology, line, v, stops)
-        elif ints[i, STILL] > len(topology.links):  # it comes by an edge again
+        elif ints[i, STILL] > len(topology.links):  # it has been here before
             line = stopped(line, AT_COLLAPSED)
         else:
             line = over_edge(topology, line, m, parameter)

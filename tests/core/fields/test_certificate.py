@@ -186,6 +186,9 @@ FORGERIES = {
     "unreached": lambda rng, a: a["values"].__setitem__(
         int(rng.integers(len(a["values"]))), np.inf
     ),
+    "all minus infinity": lambda _, a: a.update(values=np.full(len(a["values"]), -np.inf)),
+    "all infinite": lambda _, a: a.update(values=np.full(len(a["values"]), np.inf)),
+    "a value more": lambda _, a: a.update(values=np.append(a["values"], 0.0)),
     "huge": lambda rng, a: a["h"].__setitem__(int(rng.integers(len(a["a"]))), 1e200),
     "a negative height": lambda rng, a: a["h"].__setitem__(int(rng.integers(len(a["a"]))), -1.0),
     "a piece fewer": lambda _, a: a.update({n: a[n][:-1] for n in ("a", "h", "sigma", "t")}),
@@ -292,8 +295,9 @@ def run_checker(folder, *arguments):
     script = (
         f"{blocked}sys.argv[0] = 'verify'; runpy.run_path({str(CHECKER)!r}, run_name='__main__')"
     )
-    command = [sys.executable, "-I", "-c", script, *arguments]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
+    files = [str(folder / name) for name in arguments[:2]]
+    command = [sys.executable, "-I", "-c", script, *files, *arguments[2:]]
+    return subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
 
 
 def write_obj(path, mesh):
@@ -315,14 +319,16 @@ def test_the_checker_proves_files_without_the_library(tmp_path):
     for wrong in (["--source", "1"], ["--source", "0", "--barriers", "2"]):
         refused = run_checker(tmp_path, "mesh.obj", "proof.npz", *wrong)
         assert refused.returncode == 1
-        assert refused.stderr.startswith("refused: ")
+        assert re.match(r"refused: [a-z]", refused.stderr)
 
 
 def test_the_checker_knows_lengths_and_barriers(tmp_path):
     mesh = gc.samples.terrain(300)
     mesh = mesh.with_lengths(edge_lengths(mesh))
     gc.exact_distance(mesh, 3, barriers=[20, 21]).certify().save(tmp_path / "proof.npz")
-    np.savez(tmp_path / "mesh.npz", faces=mesh.faces, lengths=mesh.lengths)
+    np.savez(
+        tmp_path / "mesh.npz", faces=mesh.faces, lengths=mesh.lengths, vertices=0.0 * mesh.vertices
+    )
     given = "mesh.npz", "proof.npz", "--source", "v3", "--barriers", "20,21"
     done = run_checker(tmp_path, *given)
     assert done.returncode == 0, done.stderr
@@ -331,7 +337,7 @@ def test_the_checker_knows_lengths_and_barriers(tmp_path):
 def test_the_checker_needs_numpy_alone():
     nodes = ast.walk(ast.parse(CHECKER.read_text()))
     froms = {node.module for node in nodes if isinstance(node, ast.ImportFrom)}
-    assert froms <= {"collections.abc", "pathlib", "typing"}
+    assert froms <= {"collections.abc", "pathlib", "typing", "zipfile"}
     lines = re.findall(r"^import (.+)$", CHECKER.read_text(), re.MULTILINE)
     assert lines == ["argparse", "sys", "numpy as np"]
 
@@ -341,7 +347,7 @@ def test_the_checker_needs_numpy_alone():
     [
         ({"path_tails": 0.5}, "a point of a path is beside its face"),
         ({"path_faces": 1}, "a path"),
-        ({"path_first": 1}, "paths begin nowhere"),
+        ({"path_first": 1}, "there are no paths"),
     ],
 )
 def test_paths_that_are_none_are_refused(change, why):
