@@ -36,6 +36,7 @@ from app.schemas.requests import DistancesRequest
 from app.store.meshes import OpenMesh
 
 _BOUNDS = "lower", "upper"
+_VIOLATIONS = "violations"
 _VALUES_INCLUDED = {"nearest_source": 1, "gradient": 3, "lower": 1, "upper": 1}
 """Values in JSON for each distance, by name."""
 
@@ -54,8 +55,8 @@ class DistancesQuery(FromSources[DistancesRequest]):
             raise invalid_fields(["/include"], message)
         if request.certify:
             _check_certifiable(request)
-        elif set(_BOUNDS) & set(request.include):
-            raise invalid_fields(["/include"], "lower and upper go with certify only")
+        elif proved := {*_BOUNDS, _VIOLATIONS} & set(request.include):
+            raise invalid_fields(["/include"], f"{', '.join(sorted(proved))}: with certify only")
         included = list(dict.fromkeys(request.include))
         return with_default_accuracy(request.model_copy(update={"include": included}))
 
@@ -67,21 +68,25 @@ class DistancesQuery(FromSources[DistancesRequest]):
         return (JSON, NPY, OCTETS, CSV, *of_all, *([NPZ] if request.certify else []))
 
     def check_format(self, media_type: str) -> None:
-        """Refuse a second array in binary, and a proof whose numbers are rounded."""
+        """Refuse a second array in binary, one by face in tables, and a proof that is rounded."""
         message = "does not come with a bare array; ask for json, csv or ply"
         faults = [Fault("/include", f"{name} {message}") for name in self.request.include]
         if faults and media_type in (NPY, OCTETS, NPZ):
             detail = "the proof" if media_type == NPZ else "one array"
             raise problem("invalid_request", f"{media_type} holds {detail}", errors=tuple(faults))
+        if media_type in (CSV, PLY) and _VIOLATIONS in self.request.include:
+            raise invalid_fields(["/include"], "violations are values of faces; ask for json")
         if media_type == NPZ and self.representation.dtype != Representation.dtype:
             raise invalid_fields(["/query/dtype"], "a proof is in float64")
 
     def value_count(self) -> int:
         """Return the number of distances, and of the values that are included with each."""
-        columns = 1 + sum(_VALUES_INCLUDED[name] for name in self.request.include)
-        if self.request.targets is None:
-            return columns * self.size.vertices
-        return (columns + VALUES_OF_POINT) * len(self.request.targets)
+        request = self.request
+        columns = 1 + sum(_VALUES_INCLUDED.get(name, 0) for name in request.include)
+        of_faces = self.size.faces if _VIOLATIONS in request.include else 0
+        if request.targets is None:
+            return columns * self.size.vertices + of_faces
+        return (columns + VALUES_OF_POINT) * len(request.targets) + of_faces
 
     def written_points(self) -> WrittenPoints:
         """Yield the sources, then the targets."""
@@ -139,6 +144,8 @@ class DistancesQuery(FromSources[DistancesRequest]):
         for name in _BOUNDS:
             if name in request.include:
                 included[name] = _at(targets, getattr(certificate, name), field.distance_at)
+        if certificate is not None and _VIOLATIONS in request.include:
+            included[_VIOLATIONS] = certificate.violations
         members |= included
         columns = columns_of(members)
         return Answer(

@@ -104,6 +104,10 @@ class DistancesAnswer(BaseModel):
     upper: list[float | None] | None = Field(
         default=None, description="If included: lengths of paths, which bound them from above"
     )
+    violations: list[float] | None = Field(
+        default=None,
+        description="If included: by how much each face widens the gap at most, in mesh units",
+    )
     certificate: Certificate | None = Field(
         default=None, description="What the proof tells, if asked for by `certify`"
     )

@@ -143,11 +143,14 @@ class DistancesRequest(AccuracyOrEffort, AmongBarriers):
     max_distance: NonNegative | None = Field(
         default=None, description="Points farther than this, in mesh units, count as unreachable"
     )
-    include: FailFastList[Literal["nearest_source", "gradient", "lower", "upper"]] = Field(
-        default=[],
-        description="Further values of each point, in JSON, CSV and PLY: `nearest_source`, an "
-        "index into `sources`; `gradient`, the direction in which distance grows fastest, for all "
-        "vertices only; with `certify`, `lower` and `upper`, the proved bounds",
+    include: FailFastList[Literal["nearest_source", "gradient", "lower", "upper", "violations"]] = (
+        Field(
+            default=[],
+            description="Further values of each point, in JSON, CSV and PLY: `nearest_source`, an "
+            "index into `sources`; `gradient`, the direction in which distance grows fastest, for all "
+            "vertices only; with `certify`, `lower` and `upper`, the proved bounds, and of each face, "
+            "in JSON only, `violations`",
+        )
     )
     certify: StrictBool = Field(
         default=False,

@@ -88,6 +88,8 @@ class Distances:
     """Proved lower bounds of the distances; None if they were not requested"""
     upper: Floats | None = None
     """Proved upper bounds, lengths of paths; None if they were not requested"""
+    violations: Floats | None = None
+    """By how much each face widens the gap at most, mesh units; None if it was not requested"""
     certificate: Certificate | None = None
     """What the proof tells; None if none was requested"""
 
@@ -395,7 +397,7 @@ def to_distances(response: httpx2.Response) -> Distances:
         members = response.json()
         distances = _with_infinity(members["distances"])
     nearest, gradient = members.get("nearest_source"), members.get("gradient")
-    lower, upper = members.get("lower"), members.get("upper")
+    lower, upper, violations = (members.get(name) for name in ("lower", "upper", "violations"))
     certificate = members.get("certificate")
     return Distances(
         mesh_id=members["mesh_id"],
@@ -407,6 +409,7 @@ def to_distances(response: httpx2.Response) -> Distances:
         gradient=None if gradient is None else np.array(gradient, np.float64),
         lower=None if lower is None else _with_infinity(lower),
         upper=None if upper is None else _with_infinity(upper),
+        violations=None if violations is None else np.array(violations, np.float64),
         certificate=None if certificate is None else Certificate(**certificate),
     )
 

@@ -197,7 +197,7 @@ def distances(
     effort: Literal[1, 2, 4, 8] | None = None,
     max_distance: float | None = None,
     barriers: Sequence[int] = (),
-    include: Sequence[Literal["nearest_source", "gradient", "lower", "upper"]] = (),
+    include: Sequence[Literal["nearest_source", "gradient", "lower", "upper", "violations"]] = (),
     certify: bool = False,
     progress: Progress = ignore_progress,
 ) -> Flow[Distances]:

@@ -1193,6 +1193,11 @@ export interface components {
              * @description If included: lengths of paths, which bound them from above
              */
             upper?: (number | null)[] | null;
+            /**
+             * Violations
+             * @description If included: by how much each face widens the gap at most, in mesh units
+             */
+            violations?: number[] | null;
             /** @description What the proof tells, if asked for by `certify` */
             certificate?: components["schemas"]["Certificate"] | null;
             unreachable: components["schemas"]["Unreachable"];
@@ -1277,9 +1282,9 @@ export interface components {
             max_distance?: number | null;
             /**
              * Include
-             * @description Further values of each point, in JSON, CSV and PLY: `nearest_source`, an index into `sources`; `gradient`, the direction in which distance grows fastest, for all vertices only; with `certify`, `lower` and `upper`, the proved bounds. Default: `[]`
+             * @description Further values of each point, in JSON, CSV and PLY: `nearest_source`, an index into `sources`; `gradient`, the direction in which distance grows fastest, for all vertices only; with `certify`, `lower` and `upper`, the proved bounds, and of each face, in JSON only, `violations`. Default: `[]`
              */
-            include?: ("nearest_source" | "gradient" | "lower" | "upper")[];
+            include?: ("nearest_source" | "gradient" | "lower" | "upper" | "violations")[];
             /**
              * Certify
              * @description Also prove the distances of vertices, for `exact` and `approximate`, from sources that are points. It takes about half a millisecond a face. The answer has a `certificate`, and as `npz` it is the file that `geodesic-verify` checks. Default: `false`

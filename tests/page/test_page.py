@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -450,6 +451,35 @@ def test_exact_and_approximate_side_by_side(view: View, knot: str) -> None:
 
     assert "guaranteed: 0.2" in view.text("#legend-title")
     assert view.text("#tick-2") == view.text("#measured-approximate").split()[0]
+
+
+def test_a_proof_beside_the_distances(view: View, knot: str) -> None:
+    view.open(f"/?mesh={knot}&source=v0")
+    assert not view.page.is_visible("#proof")
+
+    view.page.click("#shades >> text=Proof")
+    view.wait()
+
+    found = re.fullmatch(r"✓ Proved to (\de-\d+) of the largest distance", view.text("#proof"))
+    assert found
+    assert float(found[1]) < 1e-8
+    assert view.text("#legend-title") == "Violation by face, mesh units"
+    assert 0 < float(view.text("#tick-2")) < 1e-9
+
+    view.page.click("#shades >> text=Distance")
+    view.wait()
+    assert view.text("#proof") == found[0]
+    assert query_of(view).get("shade") is None
+
+    view.page.click("#methods >> text=Fast")
+    view.wait()
+    assert not view.page.is_visible("#proof")
+
+
+def test_a_fast_answer_has_no_proof(view: View, knot: str) -> None:
+    view.open(f"/?mesh={knot}&source=v0&method=fast&shade=proof")
+    assert "Fast distances have no proof" in view.text("#notes")
+    assert not view.page.is_visible("#proof")
 
 
 def test_fast_distances_beside_exact_ones(view: View, knot: str) -> None:

@@ -59,11 +59,13 @@ def test_it_is_the_library_s(
     certificate = field.certify()
     body = {"sources": [3, 9], "max_distance": limit, **method}
 
-    answer = distances(client, knot, certify=True, include=["upper", "lower"], **body).json()
+    include = ["upper", "lower", "violations"]
+    answer = distances(client, knot, certify=True, include=include, **body).json()
 
     np.testing.assert_array_equal(numbers(answer["distances"]), field.distances)
     np.testing.assert_array_equal(numbers(answer["lower"]), certificate.lower)
     np.testing.assert_array_equal(numbers(answer["upper"]), certificate.upper)
+    np.testing.assert_array_equal(answer["violations"], certificate.violations)
     bound = field.error_bound
     assert answer["error_bound"] == {"type": "absolute", "value": bound.value, "kind": "certified"}
     assert answer["certificate"] == {
@@ -120,6 +122,7 @@ def test_bounds_are_columns_of_tables(client: TestClient, knot: str) -> None:
         ({"sources": [{"vertex": 3}, CURVE]}, "/certify"),
         ({"certify": "yes"}, "/certify"),
         ({"certify": False, "include": ["lower"]}, "/include"),
+        ({"certify": False, "include": ["violations"]}, "/include"),
         ({"targets": [3, {"face": 7, "barycentric": [0.2, 0.3, 0.5]}]}, "/targets/1"),
     ],
 )
@@ -162,6 +165,9 @@ def test_only_proofs_come_as_archives_and_whole(client: TestClient, knot: str) -
         problem = check_problem(client.post(link + query, json=body), 422, "invalid_request")
         assert [fault["pointer"] for fault in problem["errors"]] == [place]
     check_problem(distances(client, knot, NPY, **proof, include=["upper"]), 422, "invalid_request")
+    by_face = proof | {"include": ["violations"]}
+    table = client.post(f"/v1/meshes/{knot}/distances?format=csv", json=by_face)
+    assert check_problem(table, 422, "invalid_request")["errors"][0]["pointer"] == "/include"
 
 
 def test_its_values_count(tmp_path: Path) -> None:
@@ -170,6 +176,8 @@ def test_its_values_count(tmp_path: Path) -> None:
 
         refused = distances(client, mesh_id, certify=True, include=["lower", "upper"])
         assert check_problem(refused, 413, "result_too_large")["actual"] == 3 * 121
+        refused = distances(client, mesh_id, certify=True, include=["violations"])
+        assert check_problem(refused, 413, "result_too_large")["actual"] == 121 + 200
 
 
 def test_it_is_long_work() -> None:

@@ -26,7 +26,7 @@ function randomState(random: Random): State {
     maxDistance: random.pick([null, random.size()]),
     isReadable: true,
     unit: random.pick(["", "mm", "µm & more"]),
-    shade: random.pick(["distance", "territories", "difference"] as const),
+    shade: random.pick(["distance", "territories", "difference", "proof"] as const),
     lines: random.pick([null, { count: 1 + random.below(99) }, { spacing: random.size() }]),
     polar: random.pick([true, false]),
     palette: random.pick(PALETTES),

@@ -3,6 +3,7 @@ import type { Question, RouteQuestion } from "../src/api/queries";
 import {
   askDistances,
   askIsolines,
+  askProof,
   askRoute,
   askSteps,
   askTerritories,
@@ -54,6 +55,14 @@ describe("isolines", () => {
     expect(await askIsolines("m", question, () => undefined, signal)).toEqual(answer);
     expect(requests[0]?.body).toEqual(question);
   });
+});
+
+test("a proof is asked for with what each face contributes", async () => {
+  const certificate = { holds: true, relative_gap: 1e-10, worst_face: 1, worst_violation: 2e-12 };
+  const answer = { certificate, violations: [0, 2e-12] };
+  const requests = fakeService({ "POST /v1/meshes/m/distances": () => json(answer) });
+  expect(await askProof("m", QUESTION, () => undefined, signal)).toEqual(answer);
+  expect(requests[0]?.body).toEqual({ ...QUESTION, certify: true, include: ["violations"] });
 });
 
 describe("distances", () => {

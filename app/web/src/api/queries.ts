@@ -5,6 +5,7 @@ import { parseNpy } from "./npy";
 import type {
   About,
   BordersAnswer,
+  Certificate,
   DistancesAnswer,
   DistancesRequest,
   ErrorBound,
@@ -54,6 +55,28 @@ export async function askDistances(
     warnings: jsonHeader<string[] | null>(response, "Geodesic-Warnings") ?? [],
     seconds: secondsOf(response),
   };
+}
+
+/** What proves the distances of a field. */
+export interface Proof {
+  certificate: Certificate;
+  /** By how much each face widens the gap at most, in mesh units. */
+  violations: number[];
+}
+
+/** Prove the distances from the sources of a question. */
+export async function askProof(
+  mesh: string,
+  question: Question,
+  onProgress: (share: number) => void,
+  signal: AbortSignal,
+): Promise<Proof> {
+  const body = { ...question, certify: true, include: ["violations"] };
+  const path = `v1/meshes/${mesh}/distances`;
+  const response = await answerOf(path, body, JSON_TYPE, onProgress, signal);
+  const { certificate, violations } = (await response.json()) as DistancesAnswer;
+  if (!certificate || !violations) throw new Error("The service returned no proof.");
+  return { certificate, violations };
 }
 
 /** Return the index of the nearest source of each vertex, -1 where there is none. */

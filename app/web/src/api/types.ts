@@ -6,6 +6,7 @@ type Schemas = components["schemas"];
 export type About = Schemas["About"];
 export type Border = Schemas["BorderDocument"];
 export type BordersAnswer = Schemas["BordersAnswer"];
+export type Certificate = Schemas["Certificate"];
 export type ErrorBound = Schemas["ErrorBound"];
 export type IsolinesAnswer = Schemas["IsolinesAnswer"];
 export type Line = Schemas["IsolineDocument"];

@@ -1,14 +1,15 @@
 // Distances to all vertices: requested when sources, method or limits change, then painted.
-import type { Field, Question } from "../api/queries";
-import { askDistances, askTerritories } from "../api/queries";
-import type { Effort, ErrorBound, Method } from "../api/types";
+import type { Field, Proof, Question } from "../api/queries";
+import { askDistances, askProof, askTerritories } from "../api/queries";
+import type { Certificate, Effort, ErrorBound, Method } from "../api/types";
 import { byId, count, duration, written } from "../dom";
+import type { LoadedMesh } from "../mesh/loader";
 import type { FacePoint } from "../mesh/picking";
 import type { Notes } from "../panel/notes";
 import { sayPoint } from "../state/point";
 import { type State, unitOf } from "../state/state";
 import { PATIENCE_MS, type Status } from "../status";
-import { hideLegend, showHere, showScale, showTerritories } from "../view/legend";
+import { hideLegend, showHere, showProof, showScale, showTerritories } from "../view/legend";
 import type { SceneView } from "../view/sceneView";
 import type { Surface } from "../view/surface";
 
@@ -22,12 +23,13 @@ interface Answers {
   error?: number;
   effort?: Effort;
   nearest?: Int32Array;
+  proofs: Partial<Record<Method, Proof>>;
 }
 
 export class Fields {
   /** Called when the colours have changed. */
   onPaint: (state: State) => void = () => undefined;
-  private answers: Answers = { key: "" };
+  private answers: Answers = { key: "", proofs: {} };
   private requested = "";
   private stop = new AbortController();
 
@@ -58,8 +60,11 @@ export class Fields {
     this.stop.abort();
     this.stop = new AbortController();
     const key = JSON.stringify([mesh, sources, barriers, maxDistance]);
-    if (key !== this.answers.key) this.answers = { key };
-    if (error !== this.answers.error) delete this.answers.approximate;
+    if (key !== this.answers.key) this.answers = { key, proofs: {} };
+    if (error !== this.answers.error) {
+      delete this.answers.approximate;
+      delete this.answers.proofs.approximate;
+    }
     if (effort !== this.answers.effort) delete this.answers.fast;
     if (!mesh || sources.length === 0 || !isReadable) this.paint(state);
     else this.request(mesh, state);
@@ -104,17 +109,21 @@ export class Fields {
       // Borders are exact in any case.
       answers.nearest ??= await askTerritories(mesh, questionOf(state, "exact"), signal);
     }
+    if (state.shade === "proof" && state.method !== "fast") {
+      const question = questionOf(state, state.method);
+      answers.proofs[state.method] ??= await askProof(mesh, question, onProgress, signal);
+    }
   }
 
   /** Paint the answers that are there; a mesh without any stays grey. */
   paint(state: State): void {
-    const { surface } = this.sceneView;
+    const { surface, mesh } = this.sceneView;
     const field = this.of(state);
     this.compare();
-    if (!surface) return;
+    if (!surface || !mesh) return;
     surface.setTerritories(null);
     this.notes.tell("distances", field ? notesOn(field, state) : []);
-    if (field) this.paintField(surface, field, state);
+    if (field) this.paintField(surface, mesh, field, state);
     else {
       surface.setValues(null, 1);
       hideLegend();
@@ -123,10 +132,18 @@ export class Fields {
     this.sceneView.stage.invalidate();
   }
 
-  private paintField(surface: Surface, field: Field, state: State): void {
+  private paintField(surface: Surface, mesh: LoadedMesh, field: Field, state: State): void {
     const { shade, sources } = state;
     const { exact, nearest } = this.answers;
     const rough = this.answers[roughOf(state)];
+    const proof = this.answers.proofs[state.method];
+    showProof(proof ? proofInWords(proof.certificate) : null);
+    if (shade === "proof" && proof) {
+      const violations = atVertices(proof.violations, mesh);
+      surface.setValues(violations, proof.certificate.worst_violation);
+      showScale(`Violation by face, ${unitOf(state)}`, proof.certificate.worst_violation);
+      return;
+    }
     if (shade === "difference" && exact && rough) {
       const errors = errorsOf(exact, rough);
       const largest = largestOf(errors);
@@ -147,7 +164,7 @@ export class Fields {
   tell(point: FacePoint | null, state: State): void {
     const field = this.of(state);
     const mesh = this.sceneView.mesh;
-    const isTold = point && field && mesh && state.shade !== "difference";
+    const isTold = point && field && mesh && !["difference", "proof"].includes(state.shade);
     const value = isTold
       ? mesh
           .corners(point.face)
@@ -189,12 +206,15 @@ function roughOf({ method }: State): Exclude<Method, "exact"> {
 }
 
 /** Return what there is to know about a field but its colours. */
-function notesOn({ bound, unreachable, warnings }: Field, { method }: State): string[] {
+function notesOn({ bound, unreachable, warnings }: Field, { method, shade }: State): string[] {
   const { disconnected, beyond_max_distance } = unreachable;
   const said = (n: number, what: string): string[] =>
     n > 0 ? [`${count(n, "vertex", "vertices")} ${what}`] : [];
   return [
     ...(method === "exact" ? [] : [`Distances: ${boundInWords(bound)}.`]),
+    ...(shade === "proof" && method === "fast"
+      ? ["Fast distances have no proof: choose another method."]
+      : []),
     ...said(disconnected, "not connected to a source."),
     ...said(beyond_max_distance, "beyond the limit."),
     ...warnings,
@@ -204,6 +224,22 @@ function notesOn({ bound, unreachable, warnings }: Field, { method }: State): st
 export function boundInWords({ value, kind, type }: ErrorBound): string {
   const size = type === "relative" ? percent(value) : written(value, 3);
   return `error ${kind === "estimated" ? "about" : "at most"} ${size} (${kind})`;
+}
+
+function proofInWords({ holds, relative_gap, worst_face }: Certificate): string {
+  const size = `${relative_gap.toExponential(0)} of the largest distance`;
+  return holds ? `✓ Proved to ${size}` : `Not proved: ${size} in doubt, most at face ${worst_face}`;
+}
+
+/** Return at each vertex the largest value of its faces. */
+function atVertices(ofFaces: number[], mesh: LoadedMesh): Float64Array {
+  const largest = new Float64Array(mesh.document.vertices);
+  for (const [face, value] of ofFaces.entries()) {
+    for (const vertex of mesh.corners(face)) {
+      largest[vertex] = Math.max(largest[vertex] ?? 0, value);
+    }
+  }
+  return largest;
 }
 
 /** Return by how many per cent each distance is wrong; -1 where unreachable. */

@@ -65,7 +65,7 @@ export function readState(search: string): WrittenState {
     maxDistance: positive(query.get("max_distance")),
     isReadable: true,
     unit: query.get("unit")?.slice(0, LONGEST_UNIT) ?? "",
-    shade: oneOf<Shade>(query.get("shade"), ["distance", "territories", "difference"]),
+    shade: oneOf<Shade>(query.get("shade"), ["distance", "territories", "difference", "proof"]),
     lines: readLines(query.get("lines")),
     polar: query.get("polar") === "1",
     palette: oneOf<Palette>(query.get("palette"), PALETTES),

@@ -2,7 +2,7 @@
 import type { Effort, Method, Point } from "../api/types";
 import type { Triple, Up } from "../mesh/frame";
 
-export type Shade = "distance" | "territories" | "difference";
+export type Shade = "distance" | "territories" | "difference" | "proof";
 export const PALETTES = ["teal", "viridis", "magma", "cividis", "turbo"] as const;
 export type Palette = (typeof PALETTES)[number];
 export type Lines = { count: number } | { spacing: number } | null;

@@ -26,6 +26,13 @@ export function showHere(words: string | null): void {
   here.textContent = words ?? "";
 }
 
+/** Show what is proved of the distances; null: nothing. */
+export function showProof(words: string | null): void {
+  const badge = byId("proof");
+  badge.hidden = words === null;
+  badge.textContent = words ?? "";
+}
+
 /** Show the scale from 0 to ``largest``. */
 export function showScale(title: string, largest: number): void {
   byId("legend").hidden = false;
