@@ -123,6 +123,9 @@ class AskingForLines(AmongBarriers):
     )
 
 
+IncludedWithDistances = Literal["nearest_source", "gradient", "lower", "upper", "violations"]
+
+
 class DistancesRequest(AccuracyOrEffort, AmongBarriers):
     """Distances from the nearest of ``sources`` to all vertices, or to ``targets`` only."""
 
@@ -143,14 +146,12 @@ class DistancesRequest(AccuracyOrEffort, AmongBarriers):
     max_distance: NonNegative | None = Field(
         default=None, description="Points farther than this, in mesh units, count as unreachable"
     )
-    include: FailFastList[Literal["nearest_source", "gradient", "lower", "upper", "violations"]] = (
-        Field(
-            default=[],
-            description="Further values of each point, in JSON, CSV and PLY: `nearest_source`, an "
-            "index into `sources`; `gradient`, the direction in which distance grows fastest, for all "
-            "vertices only; with `certify`, `lower` and `upper`, the proved bounds, and of each face, "
-            "in JSON only, `violations`",
-        )
+    include: FailFastList[IncludedWithDistances] = Field(
+        default=[],
+        description="Further values of each point, in JSON, CSV and PLY: `nearest_source`, an "
+        "index into `sources`; `gradient`, the direction in which distance grows fastest, for all "
+        "vertices only; with `certify`, `lower` and `upper`, the proved bounds, and of each face, "
+        "in JSON only, `violations`",
     )
     certify: StrictBool = Field(
         default=False,

@@ -22,6 +22,7 @@ import re
 import shutil
 import zlib
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -162,24 +163,24 @@ class MeshStore:
             if not any(self.inspect(mesh_id)):
                 return WrittenMesh(stored, folder=None)
         folder.mkdir()
-        checksums = {}
-        for array_name, array in arrays.items():
-            check()
-            checksums[array_name] = _write_array(folder / f"{array_name}.npy", array)
+        with ThreadPoolExecutor(1) as beside:  # the report of a large mesh takes as long
+            writing = beside.submit(_write_arrays, folder, arrays, check)
+            report, warnings = mesh.report.as_dict(), list(mesh.warnings)
         manifest = {
             "id": mesh_id,
             "name": name,
             "created": datetime.now(UTC).isoformat(timespec="milliseconds"),
-            "report": mesh.report.as_dict(),
-            "warnings": list(mesh.warnings),
-            "crc32": checksums,
+            "report": report,
+            "warnings": warnings,
+            "crc32": writing.result(),
         }
         if origin:
             manifest["cut_from"] = origin
         if stored:
             manifest |= {key: stored.get(key) for key in ("name", "created")}
         (folder / MANIFEST).write_bytes(encode_manifest(manifest))
-        sync_all(folder)
+        sync(folder / MANIFEST)
+        sync(folder)
         size = sum(path.stat().st_size for path in folder.iterdir())
         return WrittenMesh(manifest, folder, size)
 
@@ -330,6 +331,18 @@ def content_hash(arrays: Mapping[str, NDArray[Any]], cut_from: str = "") -> str:
             digest.update(f"{name}{array.dtype.str}{array.shape}".encode())
             digest.update(array.data.cast("B") if array.size else b"")
     return digest.hexdigest()
+
+
+def _write_arrays(
+    folder: Path, arrays: Mapping[str, NDArray[Any]], check: Callable[[], None]
+) -> dict[str, int]:
+    """Write arrays to the disk, and return the CRC-32 of each file; ``check`` may stop it."""
+    checksums = {}
+    for name, array in arrays.items():
+        check()
+        checksums[name] = _write_array(folder / f"{name}.npy", array)
+    sync_all(folder)
+    return checksums
 
 
 def _write_array(path: Path, array: NDArray[Any]) -> int:
