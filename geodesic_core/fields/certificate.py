@@ -3,16 +3,18 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from geodesic_core import verify
 from geodesic_core.arrays import Floats, Longs
-from geodesic_core.control import Control
-from geodesic_core.errors import InvalidArgument
+from geodesic_core.control import Control, in_slices
+from geodesic_core.errors import InternalError, InvalidArgument
 from geodesic_core.fields.path import located_path
 from geodesic_core.fields.question import Question
+from geodesic_core.fields.sources import Nodes
 from geodesic_core.fields.sweep_result import SweepResult, all_winners
 from geodesic_core.fields.sweeps import Sweep, WholeSweep
 from geodesic_core.files import as_output, written
@@ -25,8 +27,20 @@ from geodesic_core.kernels.certificates.edge_functions import (
     SIGMA,
     edge_function,
 )
+from geodesic_core.kernels.certificates.path_lengths import (
+    EX,
+    FX,
+    FY,
+    PLANE,
+    ROUNDED,
+    SLACK,
+    Planes,
+    Starts,
+    measure_paths,
+)
+from geodesic_core.kernels.certificates.rises import Faces, Pieces, find_jumps, find_rises
 from geodesic_core.kernels.front import window
-from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL
+from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL, Topology
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.retained.face_windows import FaceWindows, face_windows_of
 from geodesic_core.mesh.surface_point import SurfacePoint
@@ -35,9 +49,6 @@ from geodesic_core.tolerances import CERTIFIED
 
 _SAVED_PATHS = 100
 """Paths in a file, to the farthest vertex and others: they tell how large the gap is"""
-
-_TOGETHER = 2048
-"""Paths that are measured at once"""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -156,7 +167,8 @@ def certified(sweep: Sweep, result: SweepResult, control: Control) -> Certificat
         for line, start in zip(question.polylines, question.start_distances.tolist(), strict=True)
     ]
     arrays = function_on_edges(mesh, surface, windows, values, sources)
-    proof = verify.prove(surface, sources, arrays, control.for_part(1, 4).checkpoint)
+    bounds = partial(rises_and_jumps, control=control.for_part(1, 4))
+    proof = verify.prove(surface, sources, arrays, bounds)
     upper, paths = _upper_bounds(
         question, surface, sources, winners, values, control.for_part(2, 4)
     )
@@ -167,6 +179,29 @@ def certified(sweep: Sweep, result: SweepResult, control: Control) -> Certificat
     holds = bool((values - lower <= slack).all() and (high - most <= slack).all())
     control.finish()
     return Certificate(mesh, proof.lower, upper, proof.tau, holds, arrays | paths)
+
+
+def rises_and_jumps(
+    surface: verify.Surface, function: verify.Pieces, control: Control
+) -> tuple[Floats, Floats]:
+    """Return what `verify.rises_and_jumps` does, by kernels."""
+    every = np.arange(len(surface.faces))
+    turns = [surface.corner(every, c)[2:] for c in range(3)]
+    columns = ((cosine.m, sine.m, np.hypot(cosine.r, sine.r) * verify.UP) for cosine, sine in turns)
+    corners = (np.stack(column, axis=1) for column in zip(*columns, strict=True))
+    edges = surface.edges, surface.length.m, surface.length.r, surface.is_rim
+    faces = Faces(*edges, surface.faces, surface.of_face, *corners)
+    shapes = function.start, function.a, function.h, function.sigma.m, function.sigma.r
+    pieces = Pieces(*shapes, function.t0, function.t1)
+    rises, jumps = np.zeros(len(every)), np.zeros(len(surface.edges))
+
+    def rise(first: int, last: int) -> int:
+        find_rises(faces, pieces, first, last, rises)
+        return len(rises)
+
+    in_slices(len(rises), rise, control)
+    find_jumps(faces, pieces, function.values, jumps)
+    return rises, jumps
 
 
 def function_on_edges(
@@ -273,17 +308,58 @@ def _upper_bounds(
             upper[is_there] = np.minimum(upper[is_there], source.start)
     ends = np.flatnonzero(np.isfinite(values) & (upper > values))
     ends = ends[surface.label[ends] == ends]
-    chunks = range(0, len(ends), _TOGETHER)
-    for number, i in enumerate(chunks):
-        part = control.for_part(number, len(chunks))
-        paths = _paths_to(question, surface, winners, ends[i : i + _TOGETHER], part)
-        at, lengths = verify.measure(surface, sources, paths)
-        upper[at] = np.minimum(upper[at], lengths)
+    topology = question.mesh.topology
+    targets, lengths = topology.inner_vertex[ends], np.empty(len(ends))
+    planes, starts = _planes(topology, surface), _starts(question.nodes, surface, sources)
+
+    def measure(first: int, last: int) -> int:
+        part = targets[first:last], lengths[first:last]
+        measure_paths(topology, winners, planes, starts, *part)
+        return len(ends)
+
+    in_slices(len(ends), measure, control)
+    if not np.isfinite(lengths).all():
+        lost = ends[np.isinf(lengths)][0]
+        raise InternalError(f"the path to vertex {lost} is none; please report this mesh")
+    upper[ends] = np.minimum(upper[ends], lengths)
     upper = upper[surface.label]
     spread = np.linspace(0, len(ends) - 1, min(_SAVED_PATHS, len(ends))).astype(int)
     some = ends[np.argsort(values[ends])[spread]]
     paths = _paths_to(question, surface, winners, some, control)
     return upper, {f"path_{name}": array for name, array in paths._asdict().items()}
+
+
+def _planes(topology: Topology, surface: verify.Surface) -> Planes:
+    """Return the planes of the faces that paths may cross."""
+    rows = np.full(len(surface.given), -1)
+    rows[surface.kept] = np.arange(len(surface.kept))
+    out, into, cosine, sine = surface.corner(np.arange(len(surface.kept)), 0)
+    reach = surface.length[into]
+    edges = surface.length[out], reach * cosine, reach * sine
+    planes = np.zeros((len(surface.kept), PLANE))
+    for column, edge in zip((EX, FX, FY), edges, strict=True):
+        planes[:, column] = edge.m
+        planes[:, SLACK] += edge.r + ROUNDED * np.abs(edge.m)
+    labels = surface.label[topology.outer_vertex]
+    return Planes(rows[topology.outer_face], surface.faces, planes, labels)
+
+
+def _starts(nodes: Nodes, surface: verify.Surface, sources: Sequence[verify.Source]) -> Starts:
+    """Return where paths may begin."""
+    at_vertices, count = np.full(surface.count, np.inf), len(nodes.points)
+    corners, rows = np.full((count, 3), -1), np.full(count, -1)
+    weights, distances = np.zeros((count, 3)), np.full(count, np.inf)
+    for node, index in zip(nodes.sources.tolist(), nodes.source_indices.tolist(), strict=True):
+        source, k = sources[index], node - surface.count
+        if source.vertex >= 0:
+            v = surface.label[source.vertex]
+            at_vertices[v] = min(at_vertices[v], source.start)
+            continue
+        corners[k], weights[k] = surface.label[surface.given[source.face]], source.weights
+        if all(source.weights):
+            rows[k] = np.searchsorted(surface.kept, source.face)
+        distances[k] = source.start
+    return Starts(at_vertices, corners, weights, rows, distances)
 
 
 def _paths_to(
