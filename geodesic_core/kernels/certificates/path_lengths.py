@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints, Longs
+from geodesic_core.kernels.certificates.faces import Faces, Numbers
 from geodesic_core.kernels.jit import borrowed, inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL, Topology
 from geodesic_core.kernels.outcome import Outcome
@@ -39,17 +40,13 @@ _FIRST_ROOM = 1024
 """Nodes of a path that there is room for at first"""
 
 
-class Planes(NamedTuple):
-    """The faces that paths may cross, and the vertices, as the checker has them."""
+class Surface(NamedTuple):
+    """The faces that paths may cross, and their planes."""
 
-    rows: Longs
-    """(F,): the row of an inner face; -1 where no path may cross it"""
-    corners: Longs
-    """(N, 3): by row"""
+    faces: Faces
+    numbers: Numbers
     planes: Floats
-    """(N, PLANE)"""
-    labels: Longs
-    """(V,): the checker's vertex of an inner one"""
+    """(F, PLANE)"""
 
 
 class Starts(NamedTuple):
@@ -71,7 +68,7 @@ class Starts(NamedTuple):
 def measure_paths(
     topology: Topology,
     winners: Winners,
-    planes: Planes,
+    surface: Surface,
     starts: Starts,
     targets: Ints,
     lengths: Floats,
@@ -85,20 +82,20 @@ def measure_paths(
     faces = np.empty(room, np.int32)
     for i in range(len(targets)):
         outcome, count = trace_path(topology, winners, targets[i], nodes, parameters, faces)
-        while outcome == Outcome.PATH_FULL and room <= 4 * len(planes.rows) + _FIRST_ROOM:
+        while outcome == Outcome.PATH_FULL and room <= 4 * len(surface.numbers.faces) + _FIRST_ROOM:
             room *= 4
             nodes, parameters = np.empty(room, np.int32), np.empty(room)
             faces = np.empty(room, np.int32)
             outcome, count = trace_path(topology, winners, targets[i], nodes, parameters, faces)
         lengths[i] = math.inf
         if outcome == Outcome.FINISHED:
-            lengths[i] = length_of(topology, planes, starts, nodes, parameters, faces, count)
+            lengths[i] = length_of(topology, surface, starts, nodes, parameters, faces, count)
 
 
 @kernel
 def length_of(
     topology: Topology,
-    planes: Planes,
+    surface: Surface,
     starts: Starts,
     nodes: Ints,
     parameters: Floats,
@@ -106,56 +103,56 @@ def length_of(
     count: int,
 ) -> float:
     """Return an upper bound of a path's length and its start distance; infinite if it is none."""
-    topology, planes, starts = borrowed(topology), borrowed(planes), borrowed(starts)
-    total, segments, rows = 0.0, count - 1, planes.planes
+    topology, surface, starts = borrowed(topology), borrowed(surface), borrowed(starts)
+    total, segments, rows = 0.0, count - 1, surface.planes
     for i in range(segments):
-        row = planes.rows[faces[i]]
+        row = surface.numbers.faces[faces[i]]
         if row < 0:
             return math.inf
-        v0, w0, off0 = weights_in(topology, planes, starts, row, nodes[i], parameters[i])
-        v1, w1, off1 = weights_in(topology, planes, starts, row, nodes[i + 1], parameters[i + 1])
+        v0, w0, off0 = weights_in(topology, surface, starts, row, nodes[i], parameters[i])
+        v1, w1, off1 = weights_in(topology, surface, starts, row, nodes[i + 1], parameters[i + 1])
         x = (v1 - v0) * rows[row, EX] + (w1 - w0) * rows[row, FX]
         y = (w1 - w0) * rows[row, FY]
         size = rows[row, EX] + abs(rows[row, FX]) + rows[row, FY]
         total += math.sqrt(x * x + y * y) + (rows[row, SLACK] + (off0 + off1) * size)
-    start = start_at(planes, starts, nodes[segments])
+    start = start_at(surface, starts, nodes[segments])
     return (start + total * (1.0 + 2.0 * U * (segments + 4))) * (1.0 + 4.0 * U)
 
 
 @inlined
 def weights_in(
-    topology: Topology, planes: Planes, starts: Starts, row: int, node: int, share: float
+    topology: Topology, surface: Surface, starts: Starts, row: int, node: int, share: float
 ) -> tuple[float, float, float]:
     """Return the weights of a node at the second and third corner of a face, and their error.
 
     The error is a share of S; infinite where the node is no point of the face.
     """
-    v, count = -1 - node, len(planes.labels)
+    v, count = -1 - node, len(surface.numbers.vertices)
     if v >= count:
-        return weights_of_source(planes, starts, row, v - count)
+        return weights_of_source(surface, starts, row, v - count)
     if v >= 0:
-        tail = head = planes.labels[v]
+        tail = head = surface.numbers.vertices[v]
         share = 0.0
     else:
-        tail = planes.labels[topology.links[node, TAIL]]
-        head = planes.labels[topology.links[node, HEAD]]
+        tail = surface.numbers.vertices[topology.links[node, TAIL]]
+        head = surface.numbers.vertices[topology.links[node, HEAD]]
         share = min(max(share, 0.0), 1.0)
     second = third = 0.0
     is_tail = is_head = False
     for k in range(3):
         weight = 0.0
-        if planes.corners[row, k] == tail:
+        if surface.faces.corners[row, k] == tail:
             is_tail, weight = True, 1.0 - share
-        elif planes.corners[row, k] == head:
+        elif surface.faces.corners[row, k] == head:
             weight = share
-        is_head = is_head or planes.corners[row, k] == head
+        is_head = is_head or surface.faces.corners[row, k] == head
         second, third = (weight if k == 1 else second), (weight if k == 2 else third)
     return second, third, 0.0 if is_tail and is_head else math.inf
 
 
 @kernel
 def weights_of_source(
-    planes: Planes, starts: Starts, row: int, source: int
+    surface: Surface, starts: Starts, row: int, source: int
 ) -> tuple[float, float, float]:
     """Return the same of a source that is no vertex; its weights may not add up to 1."""
     second = third = total = 0.0
@@ -163,7 +160,7 @@ def weights_of_source(
     for c in range(3):
         weight, is_corner = starts.weights[source, c], False
         for k in range(3):
-            if planes.corners[row, k] == starts.corners[source, c]:
+            if surface.faces.corners[row, k] == starts.corners[source, c]:
                 is_corner = True
                 second, third = (weight if k == 1 else second), (weight if k == 2 else third)
         is_in = is_in and (is_corner or weight == 0.0)
@@ -172,9 +169,13 @@ def weights_of_source(
 
 
 @inlined
-def start_at(planes: Planes, starts: Starts, node: int) -> float:
+def start_at(surface: Surface, starts: Starts, node: int) -> float:
     """Return the start distance of the source at a node; infinite where there is none."""
-    v, count = -1 - node, len(planes.labels)
+    v, count = -1 - node, len(surface.numbers.vertices)
     if v < 0:
         return math.inf
-    return starts.distances[v - count] if v >= count else starts.at_vertices[planes.labels[v]]
+    return (
+        starts.distances[v - count]
+        if v >= count
+        else starts.at_vertices[surface.numbers.vertices[v]]
+    )

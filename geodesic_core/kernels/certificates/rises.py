@@ -31,7 +31,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geodesic_core.arrays import Flags, Floats, Longs
+from geodesic_core.arrays import Floats, Longs
+from geodesic_core.kernels.certificates.faces import Faces
 from geodesic_core.kernels.curves.rows import with_room
 from geodesic_core.kernels.jit import borrowed, inlined, kernel
 
@@ -53,23 +54,11 @@ SIGMA_OFF = 6
 PIECE = 7
 
 
-class Faces(NamedTuple):
-    """Faces and their edges, as the checker has them."""
+class Turns(NamedTuple):
+    """The angles at the corners of faces."""
 
-    edges: Longs
-    """(E, 2): the vertices of each edge, the lower one first"""
-    length: Floats
-    """(E,)"""
-    length_off: Floats
-    """(E,): by how much it may be rounded"""
-    is_rim: Flags
-    """(E,): whether only one face has it"""
-    corners: Longs
-    """(F, 3): vertices"""
-    of_face: Longs
-    """(F, 3): the edge from each corner to the next one"""
     cosine: Floats
-    """(F, 3): at each corner"""
+    """(F, 3)"""
     sine: Floats
     off: Floats
     """(F, 3): by how much both, as a vector, may be rounded"""
@@ -100,12 +89,14 @@ class Cone(NamedTuple):
 
 
 @kernel
-def find_rises(faces: Faces, pieces: Pieces, first: int, last: int, rises: Floats) -> None:
+def find_rises(
+    faces: Faces, turns: Turns, pieces: Pieces, first: int, last: int, rises: Floats
+) -> None:
     """Fill ``rises[first:last]`` with bounds of f(q) - f(p) - |pq|, for p and q on two edges.
 
     They are 0 at least. O(pieces).
     """
-    faces, pieces = borrowed(faces), borrowed(pieces)
+    faces, turns, pieces = borrowed(faces), borrowed(turns), borrowed(pieces)
     ahead, behind = np.empty((64, PIECE)), np.empty((64, PIECE))
     for face in range(first, last):
         worst = 0.0
@@ -119,7 +110,7 @@ def find_rises(faces: Faces, pieces: Pieces, first: int, last: int, rises: Float
             ahead, behind = with_room(ahead, m), with_room(behind, n)
             put_pieces(pieces, e, faces.edges[e, 0] == corner, faces, ahead)
             put_pieces(pieces, g, faces.edges[g, 0] == corner, faces, behind)
-            turn = faces.cosine[face, c], faces.sine[face, c], faces.off[face, c]
+            turn = turns.cosine[face, c], turns.sine[face, c], turns.off[face, c]
             worst = rise_across(faces, e, g, ahead, m, behind, n, turn, worst)
             worst = rise_across(faces, g, e, behind, n, ahead, m, turn, worst)
         rises[face] = worst
@@ -269,8 +260,10 @@ def rise_of(cone: Cone, row: Floats, beta: float, worst: float) -> float:
 
 
 @kernel
-def find_jumps(faces: Faces, pieces: Pieces, values: Floats, jumps: Floats) -> None:
-    """Fill ``jumps`` with bounds of f(q) - f(p) - |pq| for p and q on one edge.
+def find_jumps(
+    faces: Faces, pieces: Pieces, values: Floats, first: int, last: int, jumps: Floats
+) -> None:
+    """Fill ``jumps[first:last]`` with bounds of f(q) - f(p) - |pq| for p and q on one edge.
 
     f rises no faster along a piece than distances do. So the bound is the largest sum of the jumps
     from p to q, each with its sign: the largest difference of two of their partial sums. There is
@@ -278,7 +271,7 @@ def find_jumps(faces: Faces, pieces: Pieces, values: Floats, jumps: Floats) -> N
     two values count.
     """
     faces, pieces = borrowed(faces), borrowed(pieces)
-    for e in range(len(jumps)):
+    for e in range(first, last):
         low, high = values[faces.edges[e, 0]], values[faces.edges[e, 1]]
         length, length_off = faces.length[e], faces.length_off[e]
         if faces.is_rim[e]:
