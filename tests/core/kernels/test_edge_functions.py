@@ -78,3 +78,13 @@ def test_gaps_in_which_two_others_are_nearest():
     windows = [[*near, 0.0, 0.5 - gap], [*near, 0.5 + gap, 1.0]]
     pieces = envelope(np.array([*ends, *windows]))
     assert pieces[:, :3].tolist() == [near, near]
+
+
+@pytest.mark.parametrize("nearer", [1e-3, 1e-6, 1e-9, 1e-12])
+def test_an_end_that_is_hardly_nearer_by_itself(nearer):
+    """The way along the edge is longer by this: the end is nearest in half of it."""
+    ends = np.array([[0.0, 0.0, 4.0, 0.0, 1.0], [1.0, 0.0, 5.0 - nearer, 0.0, 1.0]])
+    for cones in (ends, ends[::-1]):
+        pieces = envelope(cones)
+        assert pieces[:, 0].tolist() == [0.0, 1.0]
+        assert pieces[1, 3] == pytest.approx(1.0 - 0.5 * nearer, rel=0, abs=2e-15)
