@@ -328,7 +328,6 @@ class Pieces:
         is_last[start[1:][count > 0] - 1] = True
         t0 = np.where(is_first, 0.0, np.roll(t1, 1))
         refuse_unless(bool((t1[is_last] == 1.0).all() and (t0 <= t1).all()), "pieces leave gaps")
-        self.jumps = self._jumps(edge, a, h, sigma, t0, t1, is_first, is_last)
         # On a boundary edge only f at its ends is needed, as no path crosses it. Each end stands in
         # as a piece of no extent. The foot of the far end is rounded.
         rim = np.repeat(np.flatnonzero(is_rim), 2)
@@ -348,30 +347,44 @@ class Pieces:
         refuse_unless(len(edges) < 1 << 24, "more edges than the search for pieces is made for")
         self.key = 2.0 * np.repeat(np.arange(len(edges)), self.count) + self.t1
 
-    def _jumps(
-        self,
-        edge: Array,
-        a: Array,
-        h: Array,
-        sigma: Array,
-        t0: Array,
-        t1: Array,
-        is_first: Array,
-        is_last: Array,
-    ) -> Array:
-        """Return by how much f may jump along each edge: between pieces, and at its ends.
+    def jumps(self) -> Array:
+        """Return bounds of f(q) - f(p) - |pq| for p and q on one edge, for each edge.
 
-        There are many pieces, whose rounding adds up: hence extended precision.
+        f rises no faster along a piece than distances do. So the bound is the largest sum of the
+        jumps from p to q, each with its sign: the largest difference of two of their partial sums.
+        There is one at each end of an edge as well, to the value of the vertex. There are many
+        pieces, whose rounding adds up: hence extended precision.
         """
         surface, values = self.surface, self.values.astype(LONG)
-        edges, length = surface.edges, surface.long_length[edge]
-        foot, height, base = (exact(x.astype(LONG)) for x in (a, h, sigma))
-        f0, f1 = (base + norm(exact(t.astype(LONG)) * length - foot, height) for t in (t0, t1))
+        inner = np.flatnonzero(~surface.is_rim)
+        edges, count = surface.edges, self.count[inner]
+        edge = np.repeat(inner, count)
+        k = np.arange(len(edge)) + np.repeat(self.start[inner] - np.cumsum(count) + count, count)
+        first = np.cumsum(count) - count
+        length, foot, height, base = (
+            surface.long_length[edge],
+            *(exact(x[k].astype(LONG)) for x in (self.a, self.h, self.sigma.m)),
+        )
+        f0, f1 = (
+            base + norm(exact(t[k].astype(LONG)) * length - foot, height)
+            for t in (self.t0, self.t1)
+        )
+        v0, v1 = (exact(values[edges[inner, k]]) for k in (0, 1))
         before = Ball(np.roll(f1.m, 1), np.roll(f1.r, 1))
-        v0, v1 = (exact(values[edges[edge, k]]) for k in (0, 1))
-        jump = np.maximum(abs(f0 - where(is_first, v0, before)).high, 0)
-        jump = jump + np.where(is_last, np.maximum(abs(f1 - v1).high, 0), 0)
-        jumps = np.bincount(edge, jump.astype(float), len(edges)) * (1 + 1e-9)
+        before.m[first], before.r[first] = v0.m, v0.r
+        last = first + count - 1
+        jump, end = f0 - before, v1 - f1[last]
+        # Of all partial sums, those of one edge are compared, from what comes before the first jump
+        total, known = np.cumsum(jump.m), np.add.reduceat(jump.r, first) + end.r
+        start = total[first] - jump.m[first]
+        at_end = total[last] + end.m
+        most = np.maximum(np.maximum.reduceat(total, first), np.maximum(start, at_end))
+        least = np.minimum(np.minimum.reduceat(total, first), np.minimum(start, at_end))
+        rounded = known + (count + 4) * unit(total) * 2 * (
+            np.abs(total).max(initial=0) + np.abs(end.m)
+        )
+        jumps = np.zeros(len(edges))
+        jumps[inner] = ((most - least) + rounded).astype(float) * (1 + 1e-9)
         rim = surface.is_rim
         step = abs(difference(*(self.values[edges[rim, k]] for k in (0, 1)))) - surface.length[rim]
         jumps[rim] = np.maximum(step.high, 0)
@@ -473,30 +486,35 @@ class Proof(NamedTuple):
     """(F,) bounds of tau; 0 for faces that are left out"""
 
 
-def prove(
-    surface: Surface,
-    sources: list[Source],
-    given: dict[str, Array],
-    watch: Callable[[float], None] = lambda _: None,
-) -> Proof:
-    """Return lower bounds of all distances, by the function of a certificate.
-
-    The sources belong to the question: they are never taken from the file. ``watch`` is called with
-    the share that is done.
-    """
-    refuse_unless(len(sources) > 0, "there are no sources")
-    function = Pieces(surface, given)
+def rises_and_jumps(surface: Surface, function: Pieces) -> tuple[Array, Array]:
+    """Return bounds of f(q) - f(p) - |pq|, 0 at least: by face, p and q on two edges; by edge."""
     tau = np.zeros(len(surface.faces))
     for lo in range(0, len(tau), BLOCK):
-        watch(lo / len(tau))
         rows = np.arange(lo, min(lo + BLOCK, len(tau)))
         for c in range(3):
             out, into, cosine, sine = surface.corner(rows, c)
             for e, g in ((out, into), (into, out)):
                 worst = function.across(surface.faces[rows, c], e, g, cosine, sine)
                 np.maximum.at(tau, rows, worst)
+    return tau, function.jumps()
+
+
+def prove(
+    surface: Surface,
+    sources: list[Source],
+    given: dict[str, Array],
+    bounds: Callable[[Surface, Pieces], tuple[Array, Array]] = rises_and_jumps,
+) -> Proof:
+    """Return lower bounds of all distances, by the function of a certificate.
+
+    The sources belong to the question: they are never taken from the file. The library has
+    ``bounds`` of its own, which are faster.
+    """
+    refuse_unless(len(sources) > 0, "there are no sources")
+    function = Pieces(surface, given)
+    tau, jumps = bounds(surface, function)
     _rise_from_sources(surface, function, sources, tau)
-    tau = (tau + function.jumps[surface.of_face].sum(axis=1)) * UP
+    tau = (tau + jumps[surface.of_face].sum(axis=1)) * UP
     values = function.values
     # Only faces count that a path no longer than the value can reach.
     total = tau.sum() * (1 + 1e-9)

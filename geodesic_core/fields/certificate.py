@@ -3,30 +3,47 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from geodesic_core import verify
 from geodesic_core.arrays import Floats, Longs
-from geodesic_core.control import Control
-from geodesic_core.errors import InvalidArgument
+from geodesic_core.control import Control, in_slices
+from geodesic_core.errors import InternalError, InvalidArgument
 from geodesic_core.fields.path import located_path
 from geodesic_core.fields.question import Question
+from geodesic_core.fields.sources import Nodes
 from geodesic_core.fields.sweep_result import SweepResult, all_winners
 from geodesic_core.fields.sweeps import Sweep, WholeSweep
 from geodesic_core.files import as_output, written
 from geodesic_core.kernels.certificates.edge_functions import (
-    CONE,
-    FOOT,
-    HEIGHT,
-    HIGH,
-    LOW,
-    SIGMA,
+    EdgeFunction,
+    OnEdges,
+    Sides,
     edge_function,
+    sides_of,
 )
-from geodesic_core.kernels.front import window
-from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL
+from geodesic_core.kernels.certificates.faces import Faces, Numbers
+from geodesic_core.kernels.certificates.path_lengths import (
+    EX,
+    FX,
+    FY,
+    PLANE,
+    ROUNDED,
+    SLACK,
+    Starts,
+    Surface,
+    measure_paths,
+)
+from geodesic_core.kernels.certificates.rises import (
+    Pieces,
+    Turns,
+    find_jumps,
+    find_rises,
+)
+from geodesic_core.kernels.mesh.half_edges import Topology
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.retained.face_windows import FaceWindows, face_windows_of
 from geodesic_core.mesh.surface_point import SurfacePoint
@@ -35,9 +52,6 @@ from geodesic_core.tolerances import CERTIFIED
 
 _SAVED_PATHS = 100
 """Paths in a file, to the farthest vertex and others: they tell how large the gap is"""
-
-_TOGETHER = 2048
-"""Paths that are measured at once"""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -155,10 +169,13 @@ def certified(sweep: Sweep, result: SweepResult, control: Control) -> Certificat
         _source(line[0], start)
         for line, start in zip(question.polylines, question.start_distances.tolist(), strict=True)
     ]
-    arrays = function_on_edges(mesh, surface, windows, values, sources)
-    proof = verify.prove(surface, sources, arrays, control.for_part(1, 4).checkpoint)
+    numbers = _numbers(mesh.topology, surface)
+    sides = sides_of(mesh.topology, _faces(surface), numbers)
+    arrays = _function_on_edges(surface, sides, windows, values, sources, control.for_part(1, 4))
+    bounds = partial(rises_and_jumps, control=control.for_part(2, 4))
+    proof = verify.prove(surface, sources, arrays, bounds)
     upper, paths = _upper_bounds(
-        question, surface, sources, winners, values, control.for_part(2, 4)
+        question, surface, numbers, sources, winners, values, control.for_part(3, 4)
     )
     reached = np.isfinite(upper)
     slack = CERTIFIED * float(upper[reached].max())
@@ -169,86 +186,82 @@ def certified(sweep: Sweep, result: SweepResult, control: Control) -> Certificat
     return Certificate(mesh, proof.lower, upper, proof.tau, holds, arrays | paths)
 
 
-def function_on_edges(
-    mesh: TriangleMesh,
+def _numbers(topology: Topology, surface: verify.Surface) -> Numbers:
+    """Return what the checker calls inner faces and vertices."""
+    rows = np.full(len(surface.given), -1)
+    rows[surface.kept] = np.arange(len(surface.kept))
+    return Numbers(rows[topology.outer_face], surface.label[topology.outer_vertex])
+
+
+def _faces(surface: verify.Surface) -> Faces:
+    """Return faces and edges for kernels."""
+    length = surface.length.m, surface.length.r
+    return Faces(surface.edges, *length, surface.is_rim, surface.faces, surface.of_face)
+
+
+def rises_and_jumps(
+    surface: verify.Surface, function: verify.Pieces, control: Control
+) -> tuple[Floats, Floats]:
+    """Return what `verify.rises_and_jumps` does, by kernels."""
+    faces, every = _faces(surface), np.arange(len(surface.faces))
+    turns = [surface.corner(every, c)[2:] for c in range(3)]
+    columns = ((cosine.m, sine.m, np.hypot(cosine.r, sine.r) * verify.UP) for cosine, sine in turns)
+    of_corners = Turns(*(np.stack(column, axis=1) for column in zip(*columns, strict=True)))
+    cones = function.start, function.a, function.h, function.sigma.m, function.sigma.r
+    pieces = Pieces(*cones, function.t0, function.t1)
+    rises, jumps = np.zeros(len(every)), np.zeros(len(surface.edges))
+
+    def find_rises_of(first: int, last: int) -> int:
+        find_rises(faces, of_corners, pieces, first, last, rises)
+        return len(rises)
+
+    def find_jumps_of(first: int, last: int) -> int:
+        find_jumps(faces, pieces, function.values, first, last, jumps)
+        return len(jumps)
+
+    in_slices(len(rises), find_rises_of, control.for_part(0, 2))
+    in_slices(len(jumps), find_jumps_of, control.for_part(1, 2))
+    return rises, jumps
+
+
+def _function_on_edges(
     surface: verify.Surface,
+    sides: Sides,
     windows: FaceWindows,
     values: Floats,
     sources: Sequence[verify.Source],
+    control: Control,
 ) -> dict[str, Floats | Longs]:
     """Return the least of windows and of distances of the ends, on each edge of two faces or more.
 
     Sources on an edge count there as well.
     """
-    edges, length, inside = surface.edges, surface.length.m, np.flatnonzero(~surface.is_rim)
-    everywhere, none = length[inside], np.zeros(len(inside))
-    of_ends = [
-        np.stack([k * everywhere, none, values[edges[inside, k]], none, everywhere], axis=1)
-        for k in (0, 1)
-    ]
-    at, of_windows = _cones_of_windows(mesh, surface, windows)
-    on, of_sources = _cones_of_sources(surface, sources)
-    edge = np.concatenate([inside, inside, on, at])
-    cones = np.concatenate([*of_ends, of_sources, of_windows])
-    is_kept = ~surface.is_rim[edge]
-    order = np.flatnonzero(is_kept)[np.argsort(edge[is_kept], kind="stable")]
-    cones, first = cones[order], np.searchsorted(edge[order], np.arange(len(edges) + 1))
-    counts, which, ends = edge_function(first, cones, length)
-    share = np.minimum(ends / np.repeat(length, counts), 1.0)
-    share[np.cumsum(counts)[counts > 0] - 1] = 1.0
-    foot, height, sigma = (cones[which, k] for k in (FOOT, HEIGHT, SIGMA))
-    return {
-        "values": values,
-        "pieces": counts,
-        "a": foot,
-        "h": height,
-        "sigma": sigma,
-        "t": share,
-    }
+    given = _faces(surface), sides, windows, values, _sources_on_edges(surface, sources)
+    parts = [edge_function(*given, 0, 0)]
+
+    def find(first: int, last: int) -> int:
+        parts.append(edge_function(*given, first, last))
+        return len(surface.edges)
+
+    in_slices(len(surface.edges), find, control)
+    function = map(np.concatenate, zip(*parts, strict=True))
+    return {"values": values, **dict(zip(EdgeFunction._fields, function, strict=True))}
 
 
-def _cones_of_windows(
-    mesh: TriangleMesh, surface: verify.Surface, windows: FaceWindows
-) -> tuple[Longs, Floats]:
-    """Return the edge of each window, and its cone."""
-    topology, rows = mesh.topology, windows.windows
-    h = np.repeat(np.arange(len(topology.links)), np.diff(windows.first))
-    tail, head = (surface.label[topology.outer_vertex[topology.links[h, k]]] for k in (TAIL, HEAD))
-    edge = _edges_between(surface, tail, head)
-    length, is_turned = surface.length.m[edge], tail > head
-    cones = np.empty((len(rows), CONE))
-    sx = rows[:, window.SX]
-    cones[:, FOOT] = np.where(is_turned, length - sx, sx)
-    cones[:, HEIGHT], cones[:, SIGMA] = np.abs(rows[:, window.SY]), rows[:, window.SIGMA]
-    b0, b1 = rows[:, window.B0], rows[:, window.B1]
-    cones[:, LOW] = np.where(is_turned, length - b1, b0)
-    cones[:, HIGH] = np.where(is_turned, length - b0, b1)
-    return edge, cones
-
-
-def _cones_of_sources(
-    surface: verify.Surface, sources: Sequence[verify.Source]
-) -> tuple[Longs, Floats]:
-    """Return the edges that sources lie on, none at a vertex, and their cones."""
-    edges, cones = [], []
+def _sources_on_edges(surface: verify.Surface, sources: Sequence[verify.Source]) -> OnEdges:
+    """Return the sources that lie on edges, none at a vertex."""
+    keys, found = surface.edges[:, 0] * surface.count + surface.edges[:, 1], []
     for source in sources:
         held = np.flatnonzero(source.weights)
         if source.vertex < 0 and len(held) == 2:
-            low, high = sorted(surface.label[surface.given[source.face, k]] for k in held)
-            edge = int(_edges_between(surface, np.array([low]), np.array([high]))[0])
-            is_high = surface.label[surface.given[source.face]] == high
-            length = surface.length.m[edge]
-            edges.append(edge)
-            share = float(np.array(source.weights)[is_high][0])
-            cones.append([share * length, 0.0, source.start, 0.0, length])
-    return np.array(edges, np.int64), np.array(cones).reshape(-1, CONE)
-
-
-def _edges_between(surface: verify.Surface, tails: Longs, heads: Longs) -> Longs:
-    """Return the edges between vertices."""
-    keys = surface.edges[:, 0] * surface.count + surface.edges[:, 1]
-    given = np.minimum(tails, heads) * surface.count + np.maximum(tails, heads)
-    return np.searchsorted(keys, given)
+            low, high = sorted(
+                held, key=lambda k: int(surface.label[surface.given[source.face, k]])
+            )
+            ends = surface.label[surface.given[source.face, [low, high]]]
+            edge = int(np.searchsorted(keys, ends[0] * surface.count + ends[1]))
+            found.append((edge, source.weights[high] * surface.length.m[edge], source.start))
+    edges, foot, sigma = np.array(sorted(found)).reshape(-1, 3).T
+    return OnEdges(np.searchsorted(edges, np.arange(len(keys) + 1)), foot.copy(), sigma.copy())
 
 
 def _source(point: SurfacePoint, start: float) -> verify.Source:
@@ -260,6 +273,7 @@ def _source(point: SurfacePoint, start: float) -> verify.Source:
 def _upper_bounds(
     question: Question,
     surface: verify.Surface,
+    numbers: Numbers,
     sources: list[verify.Source],
     winners: Winners,
     values: Floats,
@@ -273,17 +287,58 @@ def _upper_bounds(
             upper[is_there] = np.minimum(upper[is_there], source.start)
     ends = np.flatnonzero(np.isfinite(values) & (upper > values))
     ends = ends[surface.label[ends] == ends]
-    chunks = range(0, len(ends), _TOGETHER)
-    for number, i in enumerate(chunks):
-        part = control.for_part(number, len(chunks))
-        paths = _paths_to(question, surface, winners, ends[i : i + _TOGETHER], part)
-        at, lengths = verify.measure(surface, sources, paths)
-        upper[at] = np.minimum(upper[at], lengths)
+    topology = question.mesh.topology
+    # In the inner order, in which neighbours follow each other: their paths cross the same faces.
+    ends = ends[np.argsort(topology.inner_vertex[ends])]
+    targets, lengths = topology.inner_vertex[ends], np.empty(len(ends))
+    crossed = Surface(_faces(surface), numbers, _planes(surface))
+    starts = _starts(question.nodes, surface, sources)
+
+    def measure(first: int, last: int) -> int:
+        part = targets[first:last], lengths[first:last]
+        measure_paths(topology, winners, crossed, starts, *part)
+        return len(ends)
+
+    in_slices(len(ends), measure, control)
+    if not np.isfinite(lengths).all():
+        lost = ends[np.isinf(lengths)][0]
+        raise InternalError(f"the path to vertex {lost} is none; please report this mesh")
+    upper[ends] = np.minimum(upper[ends], lengths)
     upper = upper[surface.label]
     spread = np.linspace(0, len(ends) - 1, min(_SAVED_PATHS, len(ends))).astype(int)
     some = ends[np.argsort(values[ends])[spread]]
     paths = _paths_to(question, surface, winners, some, control)
     return upper, {f"path_{name}": array for name, array in paths._asdict().items()}
+
+
+def _planes(surface: verify.Surface) -> Floats:
+    """Return the planes of the faces that paths may cross."""
+    out, into, cosine, sine = surface.corner(np.arange(len(surface.kept)), 0)
+    reach = surface.length[into]
+    edges = surface.length[out], reach * cosine, reach * sine
+    planes = np.zeros((len(surface.kept), PLANE))
+    for column, edge in zip((EX, FX, FY), edges, strict=True):
+        planes[:, column] = edge.m
+        planes[:, SLACK] += edge.r + ROUNDED * np.abs(edge.m)
+    return planes
+
+
+def _starts(nodes: Nodes, surface: verify.Surface, sources: Sequence[verify.Source]) -> Starts:
+    """Return where paths may begin."""
+    at_vertices, count = np.full(surface.count, np.inf), len(nodes.points)
+    corners, rows = np.full((count, 3), -1), np.full(count, -1)
+    weights, distances = np.zeros((count, 3)), np.full(count, np.inf)
+    for node, index in zip(nodes.sources.tolist(), nodes.source_indices.tolist(), strict=True):
+        source, k = sources[index], node - surface.count
+        if source.vertex >= 0:
+            v = surface.label[source.vertex]
+            at_vertices[v] = min(at_vertices[v], source.start)
+            continue
+        corners[k], weights[k] = surface.label[surface.given[source.face]], source.weights
+        if all(source.weights):
+            rows[k] = np.searchsorted(surface.kept, source.face)
+        distances[k] = source.start
+    return Starts(at_vertices, corners, weights, rows, distances)
 
 
 def _paths_to(

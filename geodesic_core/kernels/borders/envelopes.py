@@ -49,7 +49,7 @@ def crossings_of(region: Floats, other: Floats, level: float, edge: Any) -> tupl
         return (-c / r if r != 0.0 else math.nan), math.nan
     if weight > 0.0 and weight1 > 0.0:  # squared: (at + slope s)² = k² (s² + h1²), s = t - m1
         slope, k, shift = 2.0 * (m1 - m), 2.0 * c, m1
-        at = (m1 - m) * (m1 - m) + square - square1 - c * c
+        at = (m1 - m - c) * (m1 - m + c) + (square - square1)  # precise where the squares are 0
         square = square1
     else:
         shift = m if weight > 0.0 else m1

@@ -2,20 +2,25 @@
 
 A cone is σ + √((x - a)² + h²), x mesh units from the edge's lower vertex. Each window on the edge,
 from any of its faces, is a cone between its ends. So is the way along the edge from either end of
-it, over its whole length.
+it, or from a source on it, over its whole length.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from geodesic_core.arrays import Floats, Ints, Longs
+from geodesic_core.arrays import Flags, Floats, Ints, Longs
 from geodesic_core.kernels.borders.bisectors import Regions
 from geodesic_core.kernels.borders.envelopes import REGION, START, envelope_along
+from geodesic_core.kernels.certificates.faces import Faces, Numbers
 from geodesic_core.kernels.curves.regions import SIDES_END, put_disc, put_side
 from geodesic_core.kernels.curves.rows import with_room
-from geodesic_core.kernels.jit import inlined, kernel
+from geodesic_core.kernels.front.window import B0, B1, SX, SY
+from geodesic_core.kernels.front.window import SIGMA as OF_WINDOW
+from geodesic_core.kernels.jit import borrowed, inlined, kernel
+from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL, Topology
 from geodesic_core.kernels.planar import distance
+from geodesic_core.kernels.retained.face_windows import FaceWindows
 from geodesic_core.tolerances import NARROW
 
 # Columns of a cone
@@ -30,48 +35,164 @@ _CORRECTIONS = 4
 """Newton steps by which the place where two cones cross is corrected"""
 
 
+class Sides(NamedTuple):
+    """The half-edges that lie on each edge."""
+
+    first: Longs
+    """(E + 1,): the first one of each edge; those of the next one follow"""
+    half_edges: Longs
+    """(K,)"""
+    is_turned: Flags
+    """(3F,): whether a half-edge runs from its edge's upper vertex to the lower one"""
+
+
+class OnEdges(NamedTuple):
+    """Sources on edges, but for their ends."""
+
+    first: Longs
+    """(E + 1,): the first one on each edge; those on the next one follow"""
+    foot: Floats
+    """(S,): mesh units from the lower vertex"""
+    sigma: Floats
+    """(S,): start distance"""
+
+
 class EdgeFunction(NamedTuple):
     """Pieces along edges, those of an edge one after the other."""
 
-    counts: Ints
+    pieces: Ints
     """(E,): pieces of each edge"""
-    cones: Longs
-    """(N,): the cone of each piece"""
-    ends: Floats
-    """(N,): where it ends, mesh units from the lower vertex"""
+    a: Floats
+    """(N,): foot of each piece"""
+    h: Floats
+    sigma: Floats
+    t: Floats
+    """(N,): where it ends, as a share of the edge"""
 
 
 @kernel
-def edge_function(first: Longs, cones: Floats, lengths: Floats) -> EdgeFunction:
-    """Return the lower envelopes of the cones of each edge, which must cover it; O(cones²) an edge.
+def sides_of(topology: Topology, faces: Faces, numbers: Numbers) -> Sides:
+    """Return the half-edges on each edge; O(faces)."""
+    topology, faces, numbers = borrowed(topology), borrowed(faces), borrowed(numbers)
+    first, count = np.zeros(len(faces.edges) + 2, np.int64), 0
+    edge, is_turned = np.full(len(topology.links), -1), np.zeros(len(topology.links), np.uint8)
+    for h in range(len(edge)):
+        face = numbers.faces[h // 3]
+        tail = numbers.vertices[topology.links[h, TAIL]]
+        head = numbers.vertices[topology.links[h, HEAD]]
+        is_turned[h] = 1 if tail > head else 0
+        for k in range(3 if face >= 0 else 0):
+            e = faces.of_face[face, k]
+            if faces.edges[e, 0] == min(tail, head) and faces.edges[e, 1] == max(tail, head):
+                edge[h], count = e, count + 1
+                first[e + 2] += 1
+    for e in range(len(faces.edges)):
+        first[e + 2] += first[e + 1]
+    half_edges = np.empty(count, np.int64)
+    for h in range(len(edge)):
+        if edge[h] >= 0:
+            half_edges[first[edge[h] + 1]] = h
+            first[edge[h] + 1] += 1
+    return Sides(first[:-1], half_edges, is_turned)
 
-    Those of edge e are rows ``first[e]`` to ``first[e + 1]``; an edge without cones has no pieces.
+
+@kernel
+def edge_function(
+    faces: Faces,
+    sides: Sides,
+    windows: FaceWindows,
+    values: Floats,
+    sources: OnEdges,
+    first: int,
+    last: int,
+) -> EdgeFunction:
+    """Return the function on the edges ``first`` to ``last``; O(windows²) an edge.
+
+    Edges of one face have no pieces. ``values`` (V,) are those of the vertices.
     """
-    counts = np.zeros(len(lengths), np.int32)
-    rows, ends, total = np.empty(2 * len(cones), np.int64), np.empty(2 * len(cones)), 0
-    regions, labels = np.zeros((1, SIDES_END)), np.zeros(1, np.int32)
-    for e in range(len(lengths)):
-        base, number = first[e], first[e + 1] - first[e]
-        if number == 0:
+    faces, sides, windows = borrowed(faces), borrowed(sides), borrowed(windows)
+    cones, out = np.empty((64, CONE)), np.empty((1024, CONE))
+    pieces, total = np.zeros(last - first, np.int32), 0
+    for e in range(first, last):
+        if faces.is_rim[e]:
             continue
-        if number > len(regions):
-            regions, labels = np.zeros((2 * number, SIDES_END)), np.zeros(2 * number, np.int32)
-        for k in range(number):
-            put_cone(regions[k], cones[base + k])
-        of_edge = Regions(regions[:number], labels[:number], 0.0, 0.0)
-        stretches = envelope_along(of_edge, (0.0, 0.0, 1.0, 0.0), lengths[e])
-        stretches = without_gaps(stretches, cones[base : base + number], lengths[e])
-        counts[e], needed = len(stretches), total + len(stretches)
-        rows, ends = with_room(rows, needed), with_room(ends, needed)
-        for k in range(len(stretches)):
-            rows[total], ends[total] = base + int(stretches[k, REGION]), lengths[e]
-            if k > 0:
-                place, near = stretches[k, START], NARROW * lengths[e]
-                place = crossing_near(cones, rows[total - 1], rows[total], place, near)
-                before = ends[total - 2] if k > 1 else 0.0
-                ends[total - 1] = min(max(place, before), lengths[e])
-            total += 1
-    return EdgeFunction(counts, rows[:total].copy(), ends[:total].copy())
+        length, before = faces.length[e], total
+        cones, count = cones_over(faces, sides, windows, sources, e, cones)
+        cones[0, SIGMA], cones[1, SIGMA] = values[faces.edges[e, 0]], values[faces.edges[e, 1]]
+        out, total = with_pieces(cones[:count], length, out, total)
+        pieces[e - first] = total - before
+    columns = np.empty((4, total))
+    for i in range(total):
+        columns[0, i], columns[1, i] = out[i, FOOT], out[i, HEIGHT]
+        columns[2, i], columns[3, i] = out[i, SIGMA], out[i, HIGH]
+    return EdgeFunction(pieces, columns[0], columns[1], columns[2], columns[3])
+
+
+@kernel
+def cones_over(
+    faces: Faces, sides: Sides, windows: FaceWindows, sources: OnEdges, e: int, rows: Floats
+) -> tuple[Floats, int]:
+    """Fill ``rows``, or a larger array, with the cones over an edge; return it, and their number.
+
+    The first two are those of its ends, without σ.
+    """
+    length, count = faces.length[e], 2
+    needed = 2 + sources.first[e + 1] - sources.first[e]
+    for i in range(sides.first[e], sides.first[e + 1]):
+        h = sides.half_edges[i]
+        needed += windows.first[h + 1] - windows.first[h]
+    rows = with_room(rows, needed)
+    put_row(rows[0], 0.0, 0.0, 0.0, 0.0, length)
+    put_row(rows[1], length, 0.0, 0.0, 0.0, length)
+    for i in range(sources.first[e], sources.first[e + 1]):
+        put_row(rows[count], sources.foot[i], 0.0, sources.sigma[i], 0.0, length)
+        count += 1
+    for i in range(sides.first[e], sides.first[e + 1]):
+        h = sides.half_edges[i]
+        for w in range(windows.first[h], windows.first[h + 1]):
+            put_window(rows[count], windows.windows[w], length, sides.is_turned[h] > 0)
+            count += 1
+    return rows, count
+
+
+@inlined
+def put_row(row: Floats, foot: float, height: float, sigma: float, low: float, high: float) -> None:
+    """Fill a row with a cone."""
+    row[FOOT], row[HEIGHT], row[SIGMA], row[LOW], row[HIGH] = foot, height, sigma, low, high
+
+
+@inlined
+def put_window(row: Floats, window: Floats, length: float, is_turned: bool) -> None:
+    """Fill a row with the cone of a window on an edge, which may run the other way."""
+    foot, low, high = window[SX], window[B0], window[B1]
+    if is_turned:
+        foot, low, high = length - foot, length - high, length - low
+    put_row(row, foot, abs(window[SY]), window[OF_WINDOW], low, high)
+
+
+@kernel
+def with_pieces(cones: Floats, length: float, out: Floats, total: int) -> tuple[Floats, int]:
+    """Append the lower envelope of cones that cover an edge to the rows of ``out``.
+
+    They begin and end at shares of the edge. Returns the array, which may be a larger one, and how
+    many rows it has.
+    """
+    number = len(cones)
+    regions, labels = np.zeros((number, SIDES_END)), np.zeros(number, np.int32)
+    for k in range(number):
+        put_cone(regions[k], cones[k])
+    stretches = envelope_along(Regions(regions, labels, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), length)
+    stretches = without_gaps(stretches, cones, length)
+    out, start, before = with_room(out, total + len(stretches)), 0.0, -1
+    for k in range(len(stretches)):
+        cone = int(stretches[k, REGION])
+        if k > 0:
+            place = crossing_near(cones, before, cone, stretches[k, START], NARROW * length)
+            place = min(max(place / length, start), 1.0)
+            out[total - 1, HIGH] = start = place
+        put_row(out[total], cones[cone, FOOT], cones[cone, HEIGHT], cones[cone, SIGMA], start, 1.0)
+        total, before = total + 1, cone
+    return out, total
 
 
 @inlined

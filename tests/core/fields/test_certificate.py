@@ -11,7 +11,9 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core import verify
+from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument
+from geodesic_core.fields.certificate import rises_and_jumps
 from geodesic_core.tolerances import CERTIFIED
 from tests.support import zoo
 from tests.support.meshes import mesh_of, random_points
@@ -48,7 +50,28 @@ def check(mesh, field, tolerance=GAP):
     assert certificate.violations.shape == (len(mesh.faces),)
     assert certificate.worst_violation == certificate.violations[certificate.worst_face]
     assert (certificate.violations >= 0.0).all()
+    check_by_the_checker(certificate)
     return certificate
+
+
+def check_by_the_checker(certificate):
+    """What kernels bound, paths and the function on the edges, the checker bounds as closely."""
+    surface = surface_of(certificate.mesh, certificate.arrays["values"])
+    scale = certificate.upper[np.isfinite(certificate.upper)].max()
+    function = verify.Pieces(surface, certificate.arrays)
+    rises, jumps = verify.rises_and_jumps(surface, function)
+    by_kernels = rises_and_jumps(surface, function, Control())
+    assert by_kernels[0] == pytest.approx(rises, rel=0, abs=ROUNDED * scale)
+    assert by_kernels[1] == pytest.approx(jumps, rel=0, abs=ROUNDED * scale)
+
+
+def check_paths(mesh, certificate, sources):
+    """Paths of a certificate are as long as the upper bounds say."""
+    surface = surface_of(mesh, certificate.arrays["values"])
+    paths = verify.Paths(*(certificate.arrays[f"path_{name}"] for name in verify.Paths._fields))
+    ends, lengths = verify.measure(surface, sources, paths)
+    scale = lengths.max()
+    assert certificate.upper[ends] == pytest.approx(lengths, rel=0, abs=ROUNDED * scale)
 
 
 @zoo.each({name: case for name, case in zoo.KNOWN.items() if case.distances})
@@ -69,7 +92,9 @@ def test_every_small_mesh_is_certified(case):
     check(mesh, gc.exact_distance(mesh, 0, retain="windows"))
     points = random_points(mesh, 3, seed=1)
     starts = [gc.Source(point, 0.1 * i * mesh.extent) for i, point in enumerate(points)]
-    check(mesh, gc.exact_distance(mesh, starts))
+    certificate = check(mesh, gc.exact_distance(mesh, starts))
+    sources = [source(mesh.point(start.point), start.start_distance) for start in starts]
+    check_paths(mesh, certificate, sources)
 
 
 @zoo.each(zoo.IRREGULAR)
@@ -220,8 +245,13 @@ def test_no_forgery_proves_more_than_is_true(kind):
         assert (proof.lower <= true * (1 + 1e-15)).all()
 
 
+def by_kernels(surface, function):
+    return rises_and_jumps(surface, function, Control())
+
+
+@pytest.mark.parametrize("bounds", [verify.rises_and_jumps, by_kernels])
 @pytest.mark.parametrize("name", ["knot", "obstacles", "book_of_3"])
-def test_violations_bound_what_is_found_by_sampling(name):
+def test_violations_bound_what_is_found_by_sampling(name, bounds):
     """On forged functions, at points that are spread over the rims of faces."""
     case = zoo.IRREGULAR.get(name)
     mesh = gc.TriangleMesh(case.vertices, case.faces) if case else getattr(gc.samples, name)(500)
@@ -232,7 +262,7 @@ def test_violations_bound_what_is_found_by_sampling(name):
         for key in ("a", "h", "sigma", "values"):
             arrays[key] += strength * rng.random(len(arrays[key]))
         arrays["values"][0] = 0.0
-        tau = verify.prove(surface, question, arrays).tau
+        tau = verify.prove(surface, question, arrays, bounds).tau
         found = sampled(surface, arrays)
         assert (found <= tau[surface.kept] + 1e-12).all()
         assert found.max() > 0.05 * tau.max()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geodesic_core.kernels.certificates.edge_functions import CONE, edge_function
+from geodesic_core.kernels.certificates.edge_functions import CONE, with_pieces
 from geodesic_core.tolerances import NARROW
 
 
@@ -27,31 +27,35 @@ def cones_over(length, rng, count):
     return cones
 
 
-@pytest.mark.parametrize("seed", range(20))
+def envelope(cones, length=1.0):
+    """Pieces of an edge: cones, and between which shares of it."""
+    rows, count = with_pieces(cones, length, np.empty((1, CONE)), 0)
+    return rows[:count]
+
+
+@pytest.mark.parametrize("seed", range(60))
 def test_pieces_are_the_least_of_all_cones(seed):
     rng = np.random.default_rng(seed)
-    lengths = rng.uniform(0.1, 3.0, 6)
-    groups = [cones_over(length, rng, int(rng.integers(0, 9))) for length in lengths]
-    first = np.concatenate([[0], np.cumsum([len(group) for group in groups])])
-    cones = np.concatenate(groups)
-    counts, which, ends = edge_function(first, cones, lengths)
-    start = np.concatenate([[0], np.cumsum(counts)])
-    for e, length in enumerate(lengths):
-        pieces = np.arange(start[e], start[e + 1])
-        assert ends[pieces[-1]] == length
-        assert (np.diff(ends[pieces]) >= 0.0).all()
-        assert ((first[e] <= which[pieces]) & (which[pieces] < first[e + 1])).all()
-        for x in rng.uniform(0.0, length, 200):
-            k = pieces[np.searchsorted(ends[pieces], x)]
-            foot, height, sigma = cones[which[k], :3]
-            least = value_of(groups[e], x).min()
-            assert sigma + np.hypot(x - foot, height) == pytest.approx(least, abs=1e-12)
+    length = rng.uniform(0.1, 3.0)
+    cones = cones_over(length, rng, int(rng.integers(0, 9)))
+    pieces = envelope(cones, length)
+    assert pieces[0, 3] == 0.0
+    assert pieces[-1, 4] == 1.0
+    assert (pieces[1:, 3] == pieces[:-1, 4]).all()
+    assert (pieces[:, 3] <= pieces[:, 4]).all()
+    for x in rng.uniform(0.0, length, 200):
+        foot, height, sigma, *_ = pieces[np.searchsorted(pieces[:, 4], x / length)]
+        least = value_of(cones, x).min()
+        assert sigma + np.hypot(x - foot, height) == pytest.approx(least, abs=1e-12)
 
 
-def test_an_edge_without_cones_has_no_pieces():
-    counts, which, ends = edge_function(np.zeros(3, np.int64), np.empty((0, CONE)), np.ones(2))
-    assert counts.tolist() == [0, 0]
-    assert len(which) == len(ends) == 0
+def test_pieces_are_appended_to_those_of_other_edges():
+    rows, count = np.zeros((1, CONE)), 0
+    for seed in range(3):
+        cones = cones_over(1.0, np.random.default_rng(seed), 5)
+        before = count
+        rows, count = with_pieces(cones, 1.0, rows, before)
+        assert (rows[before:count] == envelope(cones)).all()
 
 
 @pytest.mark.parametrize(("gap", "is_closed"), [(0.1 * NARROW, True), (10.0 * NARROW, False)])
@@ -61,9 +65,9 @@ def test_narrow(gap, is_closed):
     ends = [[0.0, 0.0, 4.0, 0.0, 1.0], [1.0, 0.0, 4.0, 0.0, 1.0]]
     windows = [[*near, 0.0, 0.4], [*near, 0.4 + gap, 1.0]]
     cones = np.array([*ends, *windows])
-    counts, which, _ = edge_function(np.array([0, 4]), cones, np.ones(1))
-    assert counts.tolist() == ([2] if is_closed else [3])
-    assert (0 not in which) is is_closed
+    pieces = envelope(cones)
+    assert len(pieces) == (2 if is_closed else 3)
+    assert (0.0 not in pieces[:, 0]) is is_closed
 
 
 def test_gaps_in_which_two_others_are_nearest():
@@ -72,6 +76,15 @@ def test_gaps_in_which_two_others_are_nearest():
     ends = [[0.0, 0.0, 4.0, 0.0, 1.0], [1.0, 0.0, 4.0, 0.0, 1.0]]
     gap = 0.1 * NARROW
     windows = [[*near, 0.0, 0.5 - gap], [*near, 0.5 + gap, 1.0]]
-    counts, which, _ = edge_function(np.array([0, 4]), np.array([*ends, *windows]), np.ones(1))
-    assert counts.tolist() == [2]
-    assert which.tolist() == [2, 3]
+    pieces = envelope(np.array([*ends, *windows]))
+    assert pieces[:, :3].tolist() == [near, near]
+
+
+@pytest.mark.parametrize("nearer", [1e-3, 1e-6, 1e-9, 1e-12])
+def test_an_end_that_is_hardly_nearer_by_itself(nearer):
+    """The way along the edge is longer by this: the end is nearest in half of it."""
+    ends = np.array([[0.0, 0.0, 4.0, 0.0, 1.0], [1.0, 0.0, 5.0 - nearer, 0.0, 1.0]])
+    for cones in (ends, ends[::-1]):
+        pieces = envelope(cones)
+        assert pieces[:, 0].tolist() == [0.0, 1.0]
+        assert pieces[1, 3] == pytest.approx(1.0 - 0.5 * nearer, rel=0, abs=2e-15)
