@@ -3,7 +3,7 @@
 import math
 import warnings
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.errors import BlockedSource, InvalidArgument, InvalidPoint, NoPath
 from geodesic_core.fields.vertex_points import VertexPoints
-from geodesic_core.kernels.front.state import NO_SITES, NODE, SEGMENT, SEGMENT_ENDS, SITE, Sites
+from geodesic_core.kernels.front.state import NO_SITES, SEGMENT, SEGMENT_ENDS, SITE, Sites
 from geodesic_core.kernels.mesh.half_edges import TAIL
 from geodesic_core.mesh.barriers import walled_in
 from geodesic_core.mesh.canonical import each_of, half_edges_around
@@ -88,31 +88,6 @@ class Ends:
     """(M, 3): how far each is, mesh units"""
     nodes: Nodes
     """Of all sources and all targets"""
-
-    def targets_connected_to(self, source: int) -> Ints:
-        """Return the indices of the targets in the component of a source."""
-        connected = self.target_components == self.source_components[source]
-        return np.flatnonzero(connected).astype(np.int32)
-
-    def between(self, source: int, targets: Ints) -> Nodes:
-        """Return the nodes of a sweep from one source to some targets."""
-        nodes = self.nodes
-        ints = nodes.sites.ints
-        start, ends = nodes.sources[[source]], nodes.targets[targets]  # without curves, one each
-        first = np.flatnonzero(ints[: nodes.first_target, NODE] == start)
-        second = nodes.first_target + np.flatnonzero(
-            np.isin(ints[nodes.first_target :, NODE], ends)
-        )
-        rows = np.concatenate([first, second])
-        return replace(
-            nodes,
-            sources=start,
-            source_indices=np.zeros(1, np.int32),
-            targets=ends,
-            sites=nodes.sites._replace(ints=ints[rows], weights=nodes.sites.weights[rows]),
-            first_target=len(first),
-            components=(int(self.source_components[source]),),
-        )
 
 
 def ends_of(
