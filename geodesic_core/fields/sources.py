@@ -116,17 +116,24 @@ def ends_of(
         target_components=components_of(mesh, targets, control),
         corners=corners,
         reaches=reaches,
-        nodes=nodes_of(mesh, [(source,) for source in sources], targets, control),
+        nodes=nodes_of(
+            mesh,
+            sources if isinstance(sources, VertexPoints) else [(source,) for source in sources],
+            targets,
+            control,
+        ),
     )
 
 
 def nodes_of(
     mesh: TriangleMesh,
-    sources: Sequence[Polyline],
+    sources: Sequence[Polyline] | VertexPoints,
     targets: Sequence[SurfacePoint],
     control: Control,
 ) -> Nodes:
     """Return the nodes of sources, each given by its canonical points, and of targets.
+
+    A point for each of many vertices would take longer than a small sweep from it.
 
     Raises
     ------
@@ -134,6 +141,7 @@ def nodes_of(
         As the control says.
     """
     vertices, watched = len(mesh.vertices), control.watched
+    lines = () if isinstance(sources, VertexPoints) else sources
     sited: list[SurfacePoint] = []
     rows: list[tuple[int, int, int]] = []
     weights: list[tuple[float, ...]] = []
@@ -150,7 +158,7 @@ def nodes_of(
 
     started = [
         (node_of(point), i)
-        for i, line in enumerate(sources)
+        for i, line in enumerate(lines)
         for point in watched(dict.fromkeys(line))
     ]
     first_target = len(rows)
@@ -160,23 +168,30 @@ def nodes_of(
         else [node_of(point) for point in watched(targets)]
     )
     segments = [
-        (i, parts) for i, line in enumerate(sources) for parts in segments_of(mesh, watched(line))
+        (i, parts) for i, line in enumerate(lines) for parts in segments_of(mesh, watched(line))
     ]
     first_segment = vertices + len(sited)
     started += [(first_segment + k, i) for k, (i, _) in enumerate(segments)]
     in_faces = [
         (first_segment + k, part) for k, (_, parts) in enumerate(segments) for part in parts
     ]
+    source_nodes = np.array([node for node, _ in started], np.int32)
+    source_indices = np.array([source for _, source in started], np.int32)
+    components = {component_of(mesh, line[0]) for line in watched(lines)}
+    if isinstance(sources, VertexPoints):
+        source_nodes = mesh.topology.inner_vertex[sources.vertices]
+        source_indices = np.arange(len(sources), dtype=np.int32)
+        components = set(mesh.components[sources.vertices].tolist())
     return Nodes(
-        sources=np.array([node for node, _ in started], np.int32),
-        source_indices=np.array([source for _, source in started], np.int32),
+        sources=source_nodes,
+        source_indices=source_indices,
         targets=np.array(ends, np.int32),
         sites=_sites_of(mesh, len(sited) + len(segments), rows, weights, in_faces, watched),
         first_target=first_target,
         points=tuple(sited),
         segments=tuple(parts[0] for _, parts in segments),
         first_segment=first_segment,
-        components=tuple({component_of(mesh, line[0]) for line in watched(sources)}),
+        components=tuple(components),
     )
 
 

@@ -19,7 +19,7 @@ from geodesic_core.kernels.paths.backtracing import NO_END, Winners
 from geodesic_core.kernels.sweep import continuous_dijkstra, further_sources, site_targets
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
-FIRST_BUDGET = 1_000_000
+_FIRST_BUDGET = 1_000_000
 NEVER = 1 << 62
 """More work than a sweep ever does"""
 _SMALLEST_BUDGET = 1_000
@@ -38,7 +38,8 @@ class Engine(NamedTuple):
 
     advance: Callable[[Topology, Wavefront, Bounds, int], Outcome]
     """Kernel that does a slice of work, of a given budget"""
-    first_budget: int
+    first_budget: int | None = None
+    """None for the usual one"""
     most_work: float = math.inf
     """Work after which the sweep counts as one that never ends"""
 
@@ -49,7 +50,8 @@ class RowMethod(NamedTuple):
     bounds: Bounds
     advance: Callable[[Topology, Wavefront, Bounds, Rows, int], Outcome]
     """Kernel that does a slice of work on some rows"""
-    first_budget: int
+    first_budget: int | None
+    """As of an `Engine`"""
     ends_early: bool
     """Whether a sweep ends once it has found all that is wanted: exact ones do"""
     most_work: int
@@ -157,8 +159,8 @@ def run_sweep(
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As the control says.
     """
-    engine = engine or Engine(continuous_dijkstra.advance, FIRST_BUDGET)
-    budget = engine.first_budget
+    engine = engine or Engine(continuous_dijkstra.advance)
+    budget = engine.first_budget or _FIRST_BUDGET
     left, outcome, done = budget, Outcome.RUNNING, 0
     while outcome == Outcome.RUNNING or outcome in _GROW:
         control.checkpoint(share_done(wave))

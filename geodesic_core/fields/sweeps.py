@@ -15,7 +15,6 @@ from geodesic_core.fields.isolines import crossed_faces
 from geodesic_core.fields.path import EXACT, ErrorBound
 from geodesic_core.fields.question import Question
 from geodesic_core.fields.sweep import (
-    FIRST_BUDGET,
     NEVER,
     RowMethod,
     share_of_vertices,
@@ -159,7 +158,7 @@ class WholeSweep(ABC):
         """Return the means to sweep from each source, see `Sweep.row_method`."""
         bounds = self.bounds
         ends_early = not bounds.merging
-        return RowMethod(bounds, rows.advance_rows, FIRST_BUDGET, ends_early, most_work=NEVER)
+        return RowMethod(bounds, rows.advance_rows, None, ends_early, most_work=NEVER)
 
     def find_windows(self, faces: Flags, control: Control) -> FaceWindows:
         """Run the sweep for the windows of some inner faces, flags (F,)."""

@@ -120,11 +120,11 @@ def taken(points: Sequence[SurfacePoint], order: Longs) -> Sequence[SurfacePoint
 
 
 def sweep_order(positions: Floats) -> Longs:
-    """Return the points from the outside of the longest extent inwards, (n,) int64.
+    """Return the points from one end of the longest extent to the other, (n,) int64.
 
     A sweep ends at the farthest point that comes after its source. So the points that are left are
     to be near each other: on a sphere this order sweeps five sixths of the surface on average, on
-    a long surface half of it. O(n log n).
+    a long surface three quarters of it. O(n log n).
 
     Parameters
     ----------
