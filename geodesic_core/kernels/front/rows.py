@@ -29,7 +29,7 @@ from geodesic_core.kernels.front.state import (
     Wavefront,
     view_of,
 )
-from geodesic_core.kernels.jit import borrowed, kernel
+from geodesic_core.kernels.jit import borrowed, inlined, kernel, pointers
 from geodesic_core.kernels.mesh.half_edges import Topology
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.tolerances import SEARCH_SLACK
@@ -112,7 +112,7 @@ class Kind(NamedTuple):
 
 @kernel
 def advance(
-    topology: Topology, wavefront: Wavefront, bounds: Bounds, rows: Rows, budget: int, kind: Kind
+    topology: Topology, wavefront: Wavefront, bounds: Bounds, table: Rows, budget: int, kind: Kind
 ) -> Outcome:
     """Sweep row after row for a slice of about ``budget`` units; return the outcome.
 
@@ -120,7 +120,8 @@ def advance(
     it may have changed, `ROWS_DONE` and `ROWS_FULL` that entries are to be taken out. A sweep does
     not depend on the slices. Modifies the wavefront and the rows.
     """
-    topology, wavefront, rows = borrowed(topology), borrowed(wavefront), borrowed(rows)
+    room = len(table.columns) - len(table.targets)
+    topology, wavefront, rows = borrowed(topology), borrowed(wavefront), pointers(table)
     wave, state = view_of(topology, wavefront, bounds), rows.state
     spent, first, outcome = 0, state[ROW], Outcome.FINISHED
     while state[ROW] < state[LAST_ROW]:
@@ -135,7 +136,7 @@ def advance(
             continue
         if outcome != Outcome.FINISHED:
             break
-        if len(rows.columns) - state[ENTRIES] < len(rows.targets):
+        if state[ENTRIES] > room:
             outcome = Outcome.ROWS_FULL
             break
         spent += WORK_OF_ROW + wave.counters[TOUCHED]
@@ -195,7 +196,7 @@ def end_of_site(wave: View, k: int) -> int:
     return end
 
 
-@kernel
+@inlined
 def next_connected(rows: Rows, row: int, target: int) -> int:
     """Return the first column of a row, from a target on, that is connected to its source."""
     while target < rows.last_columns[row]:
@@ -232,7 +233,7 @@ def wanted_distance(wave: View, rows: Rows) -> float:
     counts has none, there is no limit: so it is looked at first. Modifies the state of the rows.
     """
     state = rows.state
-    row, count = state[ROW], 0
+    row, count, connected = state[ROW], 0, 0
     first, last = rows.first_columns[row], rows.last_columns[row]
     if rows.wanted >= last - first:
         target = state[WAITED_FOR]
@@ -244,22 +245,28 @@ def wanted_distance(wave: View, rows: Rows) -> float:
     known = np.empty(last - first)
     target = next_connected(rows, row, first)
     while target < last:
-        known[count] = known_distance(wave, rows, target)
-        count += 1
+        distance = known_distance(wave, rows, target)
+        if distance < math.inf:
+            known[count] = distance
+            count += 1
+        connected += 1
         target = next_connected(rows, row, target + 1)
-    if rows.wanted >= count:
-        return float(np.max(known[:count]))
-    return float(np.partition(known[:count], rows.wanted - 1)[rows.wanted - 1])
+    wanted = min(rows.wanted, connected)
+    if count < wanted:
+        return math.inf
+    return float(np.partition(known[:count], wanted - 1)[wanted - 1])
 
 
-@kernel
+@inlined
 def known_distance(wave: View, rows: Rows, target: int) -> float:
     """Return an upper bound of the distance of a target; in a face, past one of its corners."""
     distance, node = wave.vertices.distance, rows.targets[target]
     known = distance[node]
     if node >= wave.sizes.vertices:
         for i in range(3):
-            known = min(known, distance[rows.corners[target, i]] + rows.reaches[target, i])
+            known = min(
+                known, distance[rows.corners[3 * target + i]] + rows.reaches[3 * target + i]
+            )
     return float(known)
 
 
@@ -325,7 +332,7 @@ def reset_site(wave: View, node: int) -> None:
     vertices.winner_ints[WINNER * node + PREDECESSOR] = -1
 
 
-@kernel
+@inlined
 def put_entries(rows: Rows, node: int, distance: float) -> None:
     """Write an entry for each column of the present row that is at a node. Modifies the rows."""
     state = rows.state
