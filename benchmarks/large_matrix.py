@@ -11,10 +11,11 @@ import numpy as np
 import geodesic_core as gc
 from benchmarks.inputs import Inputs
 from benchmarks.tables import Section, rated
+from geodesic_core.arrays import Longs
 from geodesic_core.control import Control
 from geodesic_core.fields.methods import Method, sweep_of
+from geodesic_core.fields.sources import as_points
 from geodesic_core.matrices.plan import Plan
-from geodesic_core.matrices.rows import Rows, rows_of
 from geodesic_core.matrices.threads import available_cores, share_out
 from geodesic_core.search.target_sweep import TargetSweep
 
@@ -45,14 +46,14 @@ def cortex() -> gc.TriangleMesh:
 def run(_inputs: Inputs, _runs: int) -> Section:
     """Time every fiftieth sweep in one thread and in one per core, each thread by turns."""
     mesh, cores = cortex(), available_cores()
-    points = [mesh.point(i) for i in range(len(mesh.vertices))]
+    points = as_points(mesh, range(len(mesh.vertices)), "source", Control())
     plan = Plan.of(mesh, points, None, Control(), in_order=False)
-    sweeps = range(0, plan.sweeps, EVERY)
+    sweeps = np.arange(0, plan.sweeps, EVERY)
 
     rows = []
     for name in get_args(Method):
         sweep = sweep_of(mesh, name, relative_error=1e-3)
-        make = partial(rows_of, mesh, plan.ends, math.inf, sweep, partial(TargetSweep, mesh))
+        make = partial(TargetSweep, mesh, sweep)
         one_s, all_s = (_seconds(plan, sweeps, make, n) for n in (1, cores))
         whole = plan.sweeps / len(sweeps) * one_s
         limit = AT_MOST_S if name == "exact" else None
@@ -84,10 +85,11 @@ def run(_inputs: Inputs, _runs: int) -> Section:
     )
 
 
-def _seconds(plan: Plan, sweeps: range, make: Callable[[], Rows], threads: int) -> float:
-    def work(rows: Rows, part: int, control: Control) -> None:
-        sweep = sweeps[part]
-        rows.distances(sweep, plan.targets_of(sweep), control)
+def _seconds(plan: Plan, sweeps: Longs, make: Callable[[], TargetSweep], threads: int) -> float:
+    def work(memory: TargetSweep, part: int, control: Control) -> None:
+        sweep = sweeps[part : part + 1]
+        for _ in memory.rows(plan.ends, math.inf, sweep, plan.columns_of(sweep), control):
+            pass
 
     workers = [partial(work, make()) for _ in range(threads)]
     start = time.perf_counter()

@@ -13,8 +13,8 @@ from benchmarks.inputs import Inputs
 from benchmarks.large_matrix import VERTICES, cortex
 from benchmarks.tables import Section
 from geodesic_core.control import Control
+from geodesic_core.fields.sources import as_points
 from geodesic_core.matrices.plan import Plan
-from geodesic_core.matrices.rows import ExactRows
 from geodesic_core.search.target_sweep import TargetSweep
 
 SWEEPS = {2.0: 400, 20.0: 60, math.inf: 8}
@@ -24,9 +24,9 @@ SWEEPS = {2.0: 400, 20.0: 60, math.inf: 8}
 def run(_inputs: Inputs, runs: int) -> Section:
     """Sweep from neighbours and from points anywhere, in memory that is reused and in new one."""
     mesh = cortex()
-    points = [mesh.point(i) for i in range(len(mesh.vertices))]
-    plan = Plan.of(mesh, points, None, Control(), in_order=True)
-    every = np.arange(len(points), dtype=np.int32)
+    points = as_points(mesh, range(len(mesh.vertices)), "source", Control())
+    ends = Plan.of(mesh, points, None, Control(), in_order=True).ends
+    columns = np.zeros(1, np.int32), np.full(1, len(points), np.int32)
     rng = np.random.default_rng(1)
     field = gc.exact_distance(mesh, int(rng.integers(len(points))))
     kept = field.stats.windows_kept / field.stats.windows_created
@@ -35,7 +35,8 @@ def run(_inputs: Inputs, runs: int) -> Section:
         memory = TargetSweep(mesh)
         for source in sources:
             memory = memory if is_reused else TargetSweep(mesh)
-            ExactRows(plan.ends, limit, memory).distances(source, every, Control())
+            for _ in memory.rows(ends, limit, np.array([source]), columns, Control()):
+                pass
 
     rows = []
     for limit, count in SWEEPS.items():

@@ -25,6 +25,7 @@ from geodesic_core.solvers import (
     Solver,
     approximate_distance,
     cut,
+    distance_matrix,
     exact_distance,
     fast_distance,
     handle_loops,
@@ -64,11 +65,15 @@ def _paths() -> None:
 
 
 def _approximate() -> None:
-    approximate_distance(_mesh(), 0, targets=[_INSIDE], retain="paths").path_to(8)
+    mesh = _mesh()
+    approximate_distance(mesh, 0, targets=[_INSIDE], retain="paths").path_to(8)
+    distance_matrix(mesh, 0, method="approximate")
 
 
 def _fast() -> None:
-    fast_distance(_mesh(), 0, targets=[_INSIDE]).path_to(8)
+    mesh = _mesh()
+    fast_distance(mesh, 0, targets=[_INSIDE]).path_to(8)
+    distance_matrix(mesh, 0, method="fast")
 
 
 def _fast_curves() -> None:

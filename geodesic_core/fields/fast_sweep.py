@@ -11,13 +11,13 @@ from geodesic_core.control import Control
 from geodesic_core.errors import InternalError
 from geodesic_core.fields.path import ErrorBound
 from geodesic_core.fields.question import Question
-from geodesic_core.fields.sweep import Engine, run_sweep
+from geodesic_core.fields.sweep import Engine, RowMethod, run_sweep
 from geodesic_core.fields.sweep_result import Retain
 from geodesic_core.fields.sweeps import ExactSweep
-from geodesic_core.kernels.fast import sweep
+from geodesic_core.kernels.fast import rows, sweep
 from geodesic_core.kernels.fast.state import fast_bounds, new_wavefront
-from geodesic_core.kernels.front.bounds import exact_bounds
-from geodesic_core.kernels.front.counters import REACHED
+from geodesic_core.kernels.front.bounds import Bounds, exact_bounds
+from geodesic_core.kernels.front.counters import TOUCHED
 from geodesic_core.kernels.front.state import Wavefront, bytes_of, with_larger_pool
 from geodesic_core.kernels.mesh.half_edges import LENGTH
 from geodesic_core.kernels.outcome import Outcome
@@ -66,10 +66,7 @@ class FastSweep:
         """
         question = self.question
         mesh, nodes, topology = question.mesh, question.nodes, question.mesh.topology
-        limits = fast_bounds(question.bounds(exact_bounds(question.max_distance)))
-        wave = new_wavefront(
-            topology, nodes.sites, self.effort, self._bucket_width, nodes.first_target
-        )
+        limits, wave = self._bounds, self.row_state()
         while len(wave.pool.windows) < len(nodes.sources) + nodes.sites.windows:
             wave = with_larger_pool(wave)
         control.check_memory(bytes_of(wave))
@@ -77,25 +74,43 @@ class FastSweep:
         starts = question.start_distances
         sweep.start_sweep(topology, wave, nodes.sources, nodes.source_indices, starts, limits)
         reachable = max(question.reachable, 1)
-        engine = Engine(sweep.advance, _FIRST_BUDGET, MOST_CROSSINGS * len(topology.links))
+        engine = Engine(sweep.advance, _FIRST_BUDGET, self._most_work)
         wave, outcome = run_sweep(
             mesh,
             wave,
             limits,
             control,
-            lambda wave: min(float(wave.counters[REACHED]) / reachable, 1.0),
+            lambda wave: min(float(wave.counters[TOUCHED]) / reachable, 1.0),
             engine=engine,
         )
         if outcome == Outcome.RUNAWAY:
-            raise InternalError(
-                "the sweep does not end: its windows go in circles; please report this mesh, and "
-                "use exact_distance for it"
-            )
+            raise endless()
         if nodes.has_site_targets:
             sweep.reach_sites_inside(topology, wave, limits, nodes.first_target)
         wave.vertices.distance[wave.vertices.distance > question.max_distance] = np.inf
         control.finish()
         return wave
+
+    def row_state(self) -> Wavefront:
+        """Allocate the state of the sweep, nothing reached yet."""
+        question = self.question
+        return new_wavefront(
+            question.mesh.topology,
+            question.nodes.sites,
+            self.effort,
+            self._bucket_width,
+            question.nodes.first_target,
+        )
+
+    def row_method(self) -> RowMethod:
+        """Return the means to sweep from each source, see `Sweep.row_method`."""
+        return RowMethod(
+            self._bounds,
+            rows.advance_rows,
+            _FIRST_BUDGET,
+            ends_early=False,
+            most_work=self._most_work,
+        )
 
     def upper_bounds(self, distances: Floats) -> None:
         """Return None: its distances are no lower bounds."""
@@ -109,6 +124,14 @@ class FastSweep:
         return {"effort": np.array(self.effort)}
 
     @property
+    def _bounds(self) -> Bounds:
+        return fast_bounds(self.question.bounds(exact_bounds(self.question.max_distance)))
+
+    @property
+    def _most_work(self) -> int:
+        return MOST_CROSSINGS * len(self.question.mesh.topology.links)
+
+    @property
     def _bucket_width(self) -> float:
         """Width of a bucket, mesh units."""
         lengths = self.question.mesh.topology.geometry[:, LENGTH]
@@ -118,3 +141,11 @@ class FastSweep:
 def estimated(effort: int) -> ErrorBound:
     """Return the estimated error of fast distances."""
     return ErrorBound("relative", ESTIMATES[effort], "estimated")
+
+
+def endless() -> InternalError:
+    """Return the error of a fast sweep that has crossed too many windows."""
+    return InternalError(
+        "the sweep does not end: its windows go in circles; please report this mesh, and use "
+        "exact_distance for it"
+    )

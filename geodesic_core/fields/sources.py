@@ -3,7 +3,7 @@
 import math
 import warnings
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.errors import BlockedSource, InvalidArgument, InvalidPoint, NoPath
 from geodesic_core.fields.vertex_points import VertexPoints
-from geodesic_core.kernels.front.state import NO_SITES, NODE, SEGMENT, SEGMENT_ENDS, SITE, Sites
+from geodesic_core.kernels.front.state import NO_SITES, SEGMENT, SEGMENT_ENDS, SITE, Sites
 from geodesic_core.kernels.mesh.half_edges import TAIL
 from geodesic_core.mesh.barriers import walled_in
 from geodesic_core.mesh.canonical import each_of, half_edges_around
@@ -89,31 +89,6 @@ class Ends:
     nodes: Nodes
     """Of all sources and all targets"""
 
-    def targets_connected_to(self, source: int) -> Ints:
-        """Return the indices of the targets in the component of a source."""
-        connected = self.target_components == self.source_components[source]
-        return np.flatnonzero(connected).astype(np.int32)
-
-    def between(self, source: int, targets: Ints) -> Nodes:
-        """Return the nodes of a sweep from one source to some targets."""
-        nodes = self.nodes
-        ints = nodes.sites.ints
-        start, ends = nodes.sources[[source]], nodes.targets[targets]  # without curves, one each
-        first = np.flatnonzero(ints[: nodes.first_target, NODE] == start)
-        second = nodes.first_target + np.flatnonzero(
-            np.isin(ints[nodes.first_target :, NODE], ends)
-        )
-        rows = np.concatenate([first, second])
-        return replace(
-            nodes,
-            sources=start,
-            source_indices=np.zeros(1, np.int32),
-            targets=ends,
-            sites=nodes.sites._replace(ints=ints[rows], weights=nodes.sites.weights[rows]),
-            first_target=len(first),
-            components=(int(self.source_components[source]),),
-        )
-
 
 def ends_of(
     mesh: TriangleMesh,
@@ -141,17 +116,24 @@ def ends_of(
         target_components=components_of(mesh, targets, control),
         corners=corners,
         reaches=reaches,
-        nodes=nodes_of(mesh, [(source,) for source in sources], targets, control),
+        nodes=nodes_of(
+            mesh,
+            sources if isinstance(sources, VertexPoints) else [(source,) for source in sources],
+            targets,
+            control,
+        ),
     )
 
 
 def nodes_of(
     mesh: TriangleMesh,
-    sources: Sequence[Polyline],
+    sources: Sequence[Polyline] | VertexPoints,
     targets: Sequence[SurfacePoint],
     control: Control,
 ) -> Nodes:
     """Return the nodes of sources, each given by its canonical points, and of targets.
+
+    A point for each of many vertices would take longer than a small sweep from it.
 
     Raises
     ------
@@ -159,6 +141,7 @@ def nodes_of(
         As the control says.
     """
     vertices, watched = len(mesh.vertices), control.watched
+    lines = () if isinstance(sources, VertexPoints) else sources
     sited: list[SurfacePoint] = []
     rows: list[tuple[int, int, int]] = []
     weights: list[tuple[float, ...]] = []
@@ -175,7 +158,7 @@ def nodes_of(
 
     started = [
         (node_of(point), i)
-        for i, line in enumerate(sources)
+        for i, line in enumerate(lines)
         for point in watched(dict.fromkeys(line))
     ]
     first_target = len(rows)
@@ -185,23 +168,30 @@ def nodes_of(
         else [node_of(point) for point in watched(targets)]
     )
     segments = [
-        (i, parts) for i, line in enumerate(sources) for parts in segments_of(mesh, watched(line))
+        (i, parts) for i, line in enumerate(lines) for parts in segments_of(mesh, watched(line))
     ]
     first_segment = vertices + len(sited)
     started += [(first_segment + k, i) for k, (i, _) in enumerate(segments)]
     in_faces = [
         (first_segment + k, part) for k, (_, parts) in enumerate(segments) for part in parts
     ]
+    source_nodes = np.array([node for node, _ in started], np.int32)
+    source_indices = np.array([source for _, source in started], np.int32)
+    components = {component_of(mesh, line[0]) for line in watched(lines)}
+    if isinstance(sources, VertexPoints):
+        source_nodes = mesh.topology.inner_vertex[sources.vertices]
+        source_indices = np.arange(len(sources), dtype=np.int32)
+        components = set(mesh.components[sources.vertices].tolist())
     return Nodes(
-        sources=np.array([node for node, _ in started], np.int32),
-        source_indices=np.array([source for _, source in started], np.int32),
+        sources=source_nodes,
+        source_indices=source_indices,
         targets=np.array(ends, np.int32),
         sites=_sites_of(mesh, len(sited) + len(segments), rows, weights, in_faces, watched),
         first_target=first_target,
         points=tuple(sited),
         segments=tuple(parts[0] for _, parts in segments),
         first_segment=first_segment,
-        components=tuple({component_of(mesh, line[0]) for line in watched(sources)}),
+        components=tuple(components),
     )
 
 

@@ -11,6 +11,7 @@ from geodesic_core.errors import InternalError
 from geodesic_core.fields.sources import Nodes
 from geodesic_core.kernels.front import counters, pruning, state
 from geodesic_core.kernels.front.bounds import Bounds, without_merging
+from geodesic_core.kernels.front.rows import Rows
 from geodesic_core.kernels.front.state import PREDECESSOR, Merges, Wavefront
 from geodesic_core.kernels.mesh.half_edges import Topology
 from geodesic_core.kernels.outcome import Outcome
@@ -19,13 +20,9 @@ from geodesic_core.kernels.sweep import continuous_dijkstra, further_sources, si
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
 _FIRST_BUDGET = 1_000_000
+NEVER = 1 << 62
+"""More work than a sweep ever does"""
 _SMALLEST_BUDGET = 1_000
-
-_FIRST_LIMITED_BUDGET = 10_000
-_LIMITED_GROWTH = 1.25
-"""Of the slices of a sweep whose limit shrinks: each is a quarter of all before it, so that a sweep
-does not go on for longer than that once it has found enough."""
-
 
 _GROW: dict[Outcome, Callable[[Wavefront], Wavefront]] = {
     Outcome.POOL_FULL: state.with_larger_pool,
@@ -41,9 +38,24 @@ class Engine(NamedTuple):
 
     advance: Callable[[Topology, Wavefront, Bounds, int], Outcome]
     """Kernel that does a slice of work, of a given budget"""
-    first_budget: int
+    first_budget: int | None = None
+    """None for the usual one"""
     most_work: float = math.inf
     """Work after which the sweep counts as one that never ends"""
+
+
+class RowMethod(NamedTuple):
+    """The means by which a sweep finds rows of a table."""
+
+    bounds: Bounds
+    advance: Callable[[Topology, Wavefront, Bounds, Rows, int], Outcome]
+    """Kernel that does a slice of work on some rows"""
+    first_budget: int | None
+    """As of an `Engine`"""
+    ends_early: bool
+    """Whether a sweep ends once it has found all that is wanted: exact ones do"""
+    most_work: int
+    """Work after which a sweep counts as one that never ends"""
 
 
 def sweep_nodes(
@@ -54,7 +66,6 @@ def sweep_nodes(
     bounds: Bounds,
     control: Control,
     share_done: Callable[[Wavefront], float],
-    limit_of: Callable[[Wavefront], float] | None = None,
 ) -> Wavefront:
     """Start a sweep at the sources of ``nodes``, run it to its end, and reach its targets.
 
@@ -81,7 +92,7 @@ def sweep_nodes(
         )
         if nodes.has_site_targets:
             site_targets.watch_sites(wave.sites.ints, wave.pool.lists, nodes.first_target)
-        wave, outcome = run_sweep(mesh, wave, bounds, control, share, limit_of)
+        wave, outcome = run_sweep(mesh, wave, bounds, control, share)
         if nodes.has_site_targets and outcome == Outcome.FINISHED:
             continuous_dijkstra.reach_sites_inside(topology, wave, bounds, nodes.first_target)
         return wave, outcome
@@ -92,11 +103,11 @@ def sweep_nodes(
         wave, outcome = sweep(wave, without_merging(bounds))
         wave.vertices.reference[:] = -1 - wave.vertices.winner_ints[:, PREDECESSOR]
     if outcome == Outcome.RUNAWAY:
-        raise _endless(topology, wave)
+        raise endless(topology, wave)
     return wave
 
 
-def _endless(topology: Topology, wave: Wavefront) -> InternalError:
+def endless(topology: Topology, wave: Wavefront) -> InternalError:
     """Return the error of an exact sweep one of whose lists has come up too often."""
     half_edge = wave.queues.ring[wave.counters[counters.RING_HEAD]]
     return InternalError(
@@ -124,7 +135,7 @@ def add_source(
     further_sources.add_source(mesh.topology, wave, bounds, vertex, index)
     wave, outcome = run_sweep(mesh, wave, bounds, control, lambda _: 0.0)
     if outcome == Outcome.RUNAWAY:
-        raise _endless(mesh.topology, wave)
+        raise endless(mesh.topology, wave)
     return wave
 
 
@@ -134,27 +145,24 @@ def run_sweep(
     bounds: Bounds,
     control: Control,
     share_done: Callable[[Wavefront], float],
-    limit_of: Callable[[Wavefront], float] | None = None,
     engine: Engine | None = None,
 ) -> tuple[Wavefront, Outcome]:
     """Run a sweep that has started to its end; return its state, which may have grown.
 
-    Return also whether it FINISHED or is a RUNAWAY.
+    Return also how it ended: FINISHED, RUNAWAY, or in another way of the engine's.
 
-    ``share_done`` tells how much of the call is done. ``limit_of`` tells, from what is known so
-    far, how far the sweep still has to look: never farther than ``bounds``. It is asked after fixed
-    amounts of work, so that the sweep stays the same to the bit. The ``engine`` is that of
-    continuous Dijkstra by default.
+    ``share_done`` tells how much of the call is done. The ``engine`` is that of continuous Dijkstra
+    by default.
 
     Raises
     ------
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As the control says.
     """
-    engine = engine or Engine(continuous_dijkstra.advance, _FIRST_BUDGET)
-    budget = engine.first_budget if limit_of is None else _FIRST_LIMITED_BUDGET
+    engine = engine or Engine(continuous_dijkstra.advance)
+    budget = engine.first_budget or _FIRST_BUDGET
     left, outcome, done = budget, Outcome.RUNNING, 0
-    while outcome not in (Outcome.FINISHED, Outcome.RUNAWAY):
+    while outcome == Outcome.RUNNING or outcome in _GROW:
         control.checkpoint(share_done(wave))
         began = time.perf_counter()
         outcome = engine.advance(mesh.topology, wave, bounds, left)
@@ -168,11 +176,7 @@ def run_sweep(
             wave = _GROW[outcome](wave)
             control.check_memory(state.bytes_of(wave))
             continue
-        if outcome == Outcome.RUNNING and limit_of is not None:
-            limit = min(bounds.max_distance, limit_of(wave))
-            bounds = bounds._replace(max_distance=limit)
-            budget = min(int(_LIMITED_GROWTH * budget), _FIRST_BUDGET)
-        elif outcome == Outcome.RUNNING:
+        if outcome == Outcome.RUNNING:
             faster = min(max(SLICE_SECONDS / took, 0.5), 2.0)
             budget = max(int(budget * faster), _SMALLEST_BUDGET)
         left = budget

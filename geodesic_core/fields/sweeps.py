@@ -14,7 +14,12 @@ from geodesic_core.control import Control
 from geodesic_core.fields.isolines import crossed_faces
 from geodesic_core.fields.path import EXACT, ErrorBound
 from geodesic_core.fields.question import Question
-from geodesic_core.fields.sweep import share_of_vertices, sweep_nodes
+from geodesic_core.fields.sweep import (
+    NEVER,
+    RowMethod,
+    share_of_vertices,
+    sweep_nodes,
+)
 from geodesic_core.fields.sweep_result import Retain, all_winners, peak_bytes
 from geodesic_core.kernels.front import state
 from geodesic_core.kernels.front.bounds import (
@@ -27,6 +32,7 @@ from geodesic_core.kernels.front.state import Wavefront
 from geodesic_core.kernels.mesh.half_edges import SEAM
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.retained.face_windows import FaceWindows, face_windows_of
+from geodesic_core.kernels.sweep import rows, site_targets
 from geodesic_core.tolerances import WIDEST_ERROR
 
 
@@ -59,6 +65,12 @@ class Sweep(Protocol):
         InternalError
             The sweep does not end.
         """
+
+    def row_method(self) -> RowMethod:
+        """Return the means to sweep from each source of the question, one after the other."""
+
+    def row_state(self) -> Wavefront:
+        """Allocate the state of these sweeps, which reach all targets of the question."""
 
     def upper_bounds(self, distances: Floats) -> Floats | None:
         """Return upper bounds of the exact distances, of which its own are lower bounds.
@@ -114,15 +126,7 @@ class WholeSweep(ABC):
         """
         question, bounds = self.question, self.bounds
         mesh, nodes, limit = question.mesh, question.nodes, question.max_distance
-        merges = bool(bounds.merging)
-        wave = state.new_wavefront(
-            mesh.topology,
-            nodes.sites,
-            merges=merges,
-            paths=merges and paths,
-            windows=windows,
-            directed=bool(bounds.directed),
-        )
+        wave = self._new_wave(paths=paths, windows=windows)
         control.check_memory(state.bytes_of(wave))
         share = share_of_vertices(question.reachable, limit)
         starts = question.start_distances
@@ -131,6 +135,30 @@ class WholeSweep(ABC):
         wave.vertices.distance[wave.vertices.distance > limit] = math.inf
         control.finish()
         return wave
+
+    def row_state(self) -> Wavefront:
+        """Allocate the state of these sweeps, see `Sweep.row_state`."""
+        wave, nodes = self._new_wave(), self.question.nodes
+        site_targets.watch_sites(wave.sites.ints, wave.pool.lists, nodes.first_target)
+        return wave
+
+    def _new_wave(self, *, paths: bool = False, windows: Flags | None = None) -> Wavefront:
+        bounds = self.bounds
+        merges = bool(bounds.merging)
+        return state.new_wavefront(
+            self.question.mesh.topology,
+            self.question.nodes.sites,
+            merges=merges,
+            paths=merges and paths,
+            windows=windows,
+            directed=bool(bounds.directed),
+        )
+
+    def row_method(self) -> RowMethod:
+        """Return the means to sweep from each source, see `Sweep.row_method`."""
+        bounds = self.bounds
+        ends_early = not bounds.merging
+        return RowMethod(bounds, rows.advance_rows, None, ends_early, most_work=NEVER)
 
     def find_windows(self, faces: Flags, control: Control) -> FaceWindows:
         """Run the sweep for the windows of some inner faces, flags (F,)."""

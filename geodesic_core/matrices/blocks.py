@@ -15,14 +15,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geodesic_core.arrays import Floats
 from geodesic_core.errors import InvalidArgument
+from geodesic_core.search.target_sweep import Entries
 
 if TYPE_CHECKING:
     from filelock import FileLock
 
+Row = NDArray[Any]
+"""The finite distances of a row: (K,) of column, int32, and distance, float64"""
+
 _QUESTION = "question.json"
 _DIGEST_BYTES = 16
+
+
+def rows_of(entries: Entries) -> dict[int, Row]:
+    """Return the finite distances of some sweeps row by row, by the number of the sweep."""
+    found = np.empty(len(entries.columns), [("column", np.int32), ("distance", np.float64)])
+    found["column"], found["distance"] = entries.columns, entries.distances
+    parts = np.split(found, entries.ends[1:-1])
+    return dict(zip(entries.rows.tolist(), parts, strict=True))
 
 
 @dataclass(frozen=True)
@@ -101,13 +112,13 @@ class Blocks:
         except (OSError, ValueError):
             return False
 
-    def keep(self, block: int, rows: Mapping[int, Floats]) -> None:
+    def keep(self, block: int, rows: Mapping[int, Row]) -> None:
         """Write those rows of a block that are there, by sweep, instead of earlier ones."""
         content = BytesIO()
         np.savez(content, allow_pickle=False, **{str(sweep): row for sweep, row in rows.items()})
         _write(self._rows_of(block), _digest(content.getvalue()) + content.getvalue())
 
-    def kept(self, block: int) -> dict[int, Floats]:
+    def kept(self, block: int) -> dict[int, Row]:
         """Return the rows that are kept of a block; none if they are not as they were written."""
         path = self._rows_of(block)
         content = path.read_bytes() if path.exists() else b""

@@ -6,22 +6,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geodesic_core.arrays import Floats, Longs
+from geodesic_core.arrays import Longs
+from geodesic_core.matrices.blocks import Row
 from geodesic_core.matrices.plan import Plan
 
 
-def block_of(
-    plan: Plan, block: int, rows: Mapping[int, Floats], dtype: np.dtype[Any]
-) -> NDArray[Any]:
+def block_of(plan: Plan, block: int, rows: Mapping[int, Row], dtype: np.dtype[Any]) -> NDArray[Any]:
     """Return a block: (rows, targets from its first row on), mirrored in itself."""
     sweeps = plan.rows_of(block)
     first = sweeps[0] if plan.is_symmetric else 0
-    table = np.empty((len(sweeps), plan.width - first), dtype)
+    table = np.full((len(sweeps), plan.width - first), np.inf, dtype)
     for place, sweep in enumerate(sweeps):
-        row = rows[sweep]
-        table[place, plan.width - first - len(row) :] = row
+        columns = rows[sweep]["column"] - first
+        table[place, columns] = rows[sweep]["distance"]
         if plan.is_symmetric:
-            table[place:, place] = row[: len(sweeps) - place]
+            own = columns < len(sweeps)
+            table[columns[own], place] = rows[sweep]["distance"][own]
     return table
 
 

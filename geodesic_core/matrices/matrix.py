@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
-from geodesic_core.arrays import Floats, Ints
+from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument, NoPath
 from geodesic_core.extras import extra
@@ -15,11 +15,12 @@ from geodesic_core.fields.methods import SweepOf
 from geodesic_core.fields.sources import as_points, component_of, ends_of
 from geodesic_core.fields.sweeps import ExactSweep
 from geodesic_core.matrices.driver import fill
-from geodesic_core.matrices.plan import Plan
+from geodesic_core.matrices.plan import Plan, taken
 from geodesic_core.matrices.threads import as_threads
 from geodesic_core.mesh.surface_point import Points, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.path_search import PathSearch
+from geodesic_core.search.target_sweep import Entries
 from geodesic_core.search.workspace import Workspace
 from geodesic_core.validation import as_limit, check_choice
 
@@ -102,19 +103,19 @@ class _Dense:
 
     def __init__(self, plan: Plan) -> None:
         self._plan = plan
-        self._values = np.empty(plan.shape)
-        self.ends, self.sweeps, self.targets_of = plan.ends, range(plan.sweeps), plan.targets_of
+        self._values = np.full(plan.shape, math.inf)
+        self.ends, self.sweeps, self.columns_of = plan.ends, range(plan.sweeps), plan.columns_of
         self.nbytes = self._values.nbytes
 
-    def put(self, sweep: int, targets: Ints, distances: Floats) -> None:
-        """Store the distances of a sweep."""
+    def put(self, entries: Entries) -> None:
+        """Store the finite distances of some sweeps."""
         order = self._plan.order
-        rows = self._values.T if self._plan.is_flipped else self._values
+        rows, columns = entries.row_of_each, entries.columns.astype(np.int64)
+        table = self._values.T if self._plan.is_flipped else self._values
         if self._plan.is_symmetric:
-            rows[order[sweep], order[targets]] = distances
-            rows[order[targets], order[sweep]] = distances
-        else:
-            rows[sweep, targets] = distances
+            rows, columns = order[rows], order[columns]
+            table[columns, rows] = entries.distances
+        table[rows, columns] = entries.distances
 
     def result(self) -> Floats:
         """Return the matrix."""
@@ -130,20 +131,21 @@ class _Sparse:
 
         self._from_triples = coo_array
         self._plan = plan
-        self._found = [(np.empty(0, np.int32), np.empty(0))] * plan.sweeps
-        self.ends, self.sweeps, self.targets_of = plan.ends, range(plan.sweeps), plan.targets_of
+        self._found: list[Entries] = []
+        self.ends, self.sweeps, self.columns_of = plan.ends, range(plan.sweeps), plan.columns_of
         self.nbytes = 0
 
-    def put(self, sweep: int, targets: Ints, distances: Floats) -> None:
-        """Store the distances of a sweep."""
-        near = np.isfinite(distances)
-        self._found[sweep] = targets[near], distances[near]
-        self.nbytes += 12 * int(np.count_nonzero(near))
+    def put(self, entries: Entries) -> None:
+        """Store the finite distances of some sweeps."""
+        self._found.append(entries)
+        self.nbytes += entries.nbytes
 
     def result(self) -> "csr_array":
         """Return the matrix."""
-        rows = np.repeat(self.sweeps, [len(targets) for targets, _ in self._found])
-        columns, values = (np.concatenate(parts) for parts in zip(*self._found, strict=True))
+        rows, columns, values = (
+            np.concatenate([getattr(entries, name) for entries in self._found])
+            for name in ("row_of_each", "columns", "distances")
+        )
         if self._plan.is_symmetric:
             off = rows != columns
             rows, columns = (
@@ -178,20 +180,21 @@ class _Pairs:
         else:
             groups, others = by_source, targets
         many = {hub: pairs for hub, pairs in groups.items() if len(pairs) >= sweep_from}
-        self._groups = [np.array(pairs, np.int32) for pairs in many.values()]
-        self.searched = np.setdiff1d(np.arange(len(sources)), np.concatenate([[], *self._groups]))
-        self.ends = ends_of(mesh, list(many), others, control)
+        self._pairs = np.array([i for pairs in many.values() for i in pairs], np.int64)
+        self._first = np.cumsum([0, *map(len, many.values())], dtype=np.int32)
+        self.searched = np.setdiff1d(np.arange(len(sources)), self._pairs)
+        self.ends = ends_of(mesh, list(many), taken(others, self._pairs), control)
         self.sweeps = range(len(many))
         self.values = np.full(len(sources), math.inf)
         self.nbytes = self.values.nbytes
 
-    def targets_of(self, sweep: int) -> Ints:
-        """Return the targets of a sweep: one for each pair."""
-        return self._groups[sweep]
+    def columns_of(self, sweeps: Longs) -> tuple[Ints, Ints]:
+        """Return the first target of each of some sweeps, and one beyond its last."""
+        return self._first[sweeps], self._first[sweeps + 1]
 
-    def put(self, _: int, targets: Ints, distances: Floats) -> None:
-        """Store the distances of a sweep."""
-        self.values[targets] = distances
+    def put(self, entries: Entries) -> None:
+        """Store the finite distances of some sweeps."""
+        self.values[self._pairs[entries.columns]] = entries.distances
 
     def result(self) -> Floats:
         """Return the distances."""

@@ -17,7 +17,6 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument
 from geodesic_core.fields.methods import Effort, Method, promise_of, sweep_of
@@ -27,7 +26,7 @@ from geodesic_core.fields.vertex_points import VertexPoints
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
 from geodesic_core.kernels.jit.cache import sources_digest
 from geodesic_core.matrices import dense, sparse
-from geodesic_core.matrices.blocks import Blocks
+from geodesic_core.matrices.blocks import Blocks, rows_of
 from geodesic_core.matrices.driver import fill
 from geodesic_core.matrices.formats import (
     DENSE,
@@ -44,6 +43,7 @@ from geodesic_core.matrices.threads import as_threads
 from geodesic_core.mesh.barriers import with_barriers
 from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.search.target_sweep import Entries
 from geodesic_core.validation import as_limit, check_choice
 
 Everywhere = Literal["all"]
@@ -270,22 +270,24 @@ class _Rows:
             for sweep in plan.rows_of(block)
             if sweep not in rows
         ]
-        self.targets_of, self.nbytes = plan.targets_of, 0  # files do not count
+        self.columns_of, self.nbytes = plan.columns_of, 0  # files do not count
         self._lock, self._last_kept = threading.Lock(), time.monotonic()
 
-    def put(self, sweep: int, _: Ints, distances: Floats) -> None:
-        """Store the distances of a sweep."""
-        block = sweep // self._plan.block_rows
+    def put(self, entries: Entries) -> None:
+        """Store the finite distances of some sweeps."""
+        complete = {}
         with self._lock:
-            rows = self._unfinished[block]
-            rows[sweep] = distances
-            if len(rows) < len(self._plan.rows_of(block)):
-                if time.monotonic() - self._last_kept >= _KEPT_SECONDS:
-                    self.keep()
-                    self._last_kept = time.monotonic()
-                return
-            del self._unfinished[block]
-        self._blocks.put(block, self._block_of(self._plan, block, rows))
+            for sweep, row in rows_of(entries).items():
+                block = sweep // self._plan.block_rows
+                rows = self._unfinished[block]
+                rows[sweep] = row
+                if len(rows) == len(self._plan.rows_of(block)):
+                    complete[block] = self._unfinished.pop(block)
+            if not complete and time.monotonic() - self._last_kept >= _KEPT_SECONDS:
+                self.keep()
+                self._last_kept = time.monotonic()
+        for block, rows in complete.items():
+            self._blocks.put(block, self._block_of(self._plan, block, rows))
 
     @contextmanager
     def kept_if_stopped(self) -> Iterator[None]:

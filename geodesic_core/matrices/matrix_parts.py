@@ -9,16 +9,17 @@ from typing import IO, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.fields.methods import Effort, Method, sweep_of
 from geodesic_core.fields.sources import as_points
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
 from geodesic_core.matrices import dense, sparse
+from geodesic_core.matrices.blocks import Row, rows_of
 from geodesic_core.matrices.driver import fill
 from geodesic_core.matrices.formats import write_npy, write_npz
 from geodesic_core.matrices.plan import Plan, block_rows
 from geodesic_core.mesh.surface_point import Point
+from geodesic_core.search.target_sweep import Entries
 from geodesic_core.validation import as_limit, check_choice
 
 _PART_WORK = 3e8
@@ -242,10 +243,10 @@ class _Part:
     """The rows of a part in the making."""
 
     def __init__(self, plan: Plan, part: int) -> None:
-        self.sweeps, self.targets_of = plan.rows_of(part), plan.targets_of
-        self.nbytes = 8 * len(self.sweeps) * plan.width
-        self.rows: dict[int, Floats] = {}
+        self.sweeps, self.columns_of, self.nbytes = plan.rows_of(part), plan.columns_of, 0
+        self.rows: dict[int, Row] = {}
 
-    def put(self, sweep: int, _: Ints, distances: Floats) -> None:
-        """Store the distances of a sweep."""
-        self.rows[sweep] = distances
+    def put(self, entries: Entries) -> None:
+        """Store the finite distances of some sweeps."""
+        self.rows |= rows_of(entries)
+        self.nbytes += entries.nbytes

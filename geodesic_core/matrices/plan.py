@@ -60,7 +60,7 @@ class Plan:
         if targets is None:
             if not in_order:
                 order = sweep_order(_positions(mesh, sources))
-                sources = _taken(sources, order)
+                sources = taken(sources, order)
             swept_from, others = sources, sources
         else:
             swept_from, others = (targets, sources) if is_flipped else (sources, targets)
@@ -94,9 +94,13 @@ class Plan:
         first = block * self.block_rows
         return range(first, min(first + self.block_rows, self.sweeps))
 
-    def targets_of(self, sweep: int) -> Ints:
-        """Return the targets of a sweep: of a symmetric table, itself and those after it."""
-        return np.arange(sweep if self.is_symmetric else 0, self.width, dtype=np.int32)
+    def columns_of(self, sweeps: Longs) -> tuple[Ints, Ints]:
+        """Return the first target of each of some sweeps, and one beyond its last.
+
+        They are all targets; of a symmetric table, the source of the sweep and those after it.
+        """
+        last = np.full(len(sweeps), self.width, np.int32)
+        return sweeps.astype(np.int32) if self.is_symmetric else np.zeros_like(last), last
 
 
 def _positions(mesh: TriangleMesh, points: Sequence[SurfacePoint]) -> Floats:
@@ -108,7 +112,7 @@ def _positions(mesh: TriangleMesh, points: Sequence[SurfacePoint]) -> Floats:
     return np.array([mesh.position(point) for point in points])
 
 
-def _taken(points: Sequence[SurfacePoint], order: Longs) -> Sequence[SurfacePoint]:
+def taken(points: Sequence[SurfacePoint], order: Longs) -> Sequence[SurfacePoint]:
     """Return points in another order."""
     if isinstance(points, VertexPoints):
         return points.take(order)
@@ -116,11 +120,11 @@ def _taken(points: Sequence[SurfacePoint], order: Longs) -> Sequence[SurfacePoin
 
 
 def sweep_order(positions: Floats) -> Longs:
-    """Return the points from the outside of the longest extent inwards, (n,) int64.
+    """Return the points from one end of the longest extent to the other, (n,) int64.
 
     A sweep ends at the farthest point that comes after its source. So the points that are left are
     to be near each other: on a sphere this order sweeps five sixths of the surface on average, on
-    a long surface half of it. O(n log n).
+    a long surface three quarters of it. O(n log n).
 
     Parameters
     ----------

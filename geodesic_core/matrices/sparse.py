@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from geodesic_core.arrays import Floats, Longs
+from geodesic_core.arrays import Longs
+from geodesic_core.matrices.blocks import Row
 from geodesic_core.matrices.plan import Plan
 
 
@@ -19,19 +20,16 @@ class Entries(NamedTuple):
     distance: NDArray[Any]
 
 
-def block_of(
-    plan: Plan, block: int, rows: Mapping[int, Floats], dtype: np.dtype[Any]
-) -> NDArray[Any]:
+def block_of(plan: Plan, block: int, rows: Mapping[int, Row], dtype: np.dtype[Any]) -> NDArray[Any]:
     """Return a block: its finite distances by column, (K,) of sweep, target and distance."""
-    found = {sweep: np.flatnonzero(np.isfinite(rows[sweep])) for sweep in plan.rows_of(block)}
-    first = {sweep: plan.width - len(rows[sweep]) for sweep in found}
+    sweeps = plan.rows_of(block)
+    found = [rows[sweep] for sweep in sweeps]
     entries = np.empty(
-        sum(map(len, found.values())),
-        [("row", np.int32), ("column", np.int32), ("distance", dtype)],
+        sum(map(len, found)), [("row", np.int32), ("column", np.int32), ("distance", dtype)]
     )
-    entries["row"] = np.repeat(list(found), [len(near) for near in found.values()])
-    entries["column"] = np.concatenate([first[sweep] + near for sweep, near in found.items()])
-    entries["distance"] = np.concatenate([rows[sweep][near] for sweep, near in found.items()])
+    entries["row"] = np.repeat(sweeps, list(map(len, found)))
+    for name in ("column", "distance"):
+        entries[name] = np.concatenate([row[name] for row in found])
     return entries[np.argsort(entries["column"], kind="stable")]
 
 

@@ -49,16 +49,13 @@ def find_nearest(
             f"k is {k!r}; it must be an integer from 1 to the number of candidates, {len(points)}"
         )
     ends = ends_of(mesh, [start], points, control)
-    connected = ends.targets_connected_to(0)
-    indices, distances = connected[:0], np.empty(0)
-    if len(connected) > 0:
-        count = min(int(k), len(connected))
-        reached = workspace.target_sweep().distances(ends, 0, connected, count, limit, control)
-        order = _nearest_first(reached)[:count]
-        order = order[np.isfinite(reached[order])]
-        indices, distances = connected[order], reached[order]
+    row, columns = np.zeros(1, np.int64), (np.zeros(1, np.int32), np.full(1, len(points), np.int32))
+    (found,) = workspace.target_sweep().rows(ends, limit, row, columns, control, int(k))
+    by_index = np.argsort(found.columns)
+    indices, distances = found.columns[by_index], found.distances[by_index]
+    order = _nearest_first(distances)[: int(k)]
     control.finish()
-    return Nearest(indices, distances)
+    return Nearest(indices[order], distances[order])
 
 
 def _nearest_first(distances: Floats) -> Longs:

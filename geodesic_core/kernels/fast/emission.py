@@ -2,8 +2,7 @@
 
 import math
 
-from geodesic_core.kernels.fast.places import offer_over, push_vertex, relax
-from geodesic_core.kernels.front.counters import REACHED
+from geodesic_core.kernels.fast.places import note_reached, offer_over, push_vertex, relax
 from geodesic_core.kernels.front.sites import Delivery
 from geodesic_core.kernels.front.state import PREDECESSOR, WINNER, View
 from geodesic_core.kernels.front.window import Window, emitted_window
@@ -64,7 +63,7 @@ def start_at(wave: View, v: int, start: float) -> None:
     """Reach a vertex as a source, whose index it has already. Modifies the vertex and the pool."""
     vertices = wave.vertices
     if vertices.distance[v] == math.inf:
-        wave.counters[REACHED] += 1
+        note_reached(wave, v)
     vertices.distance[v] = start
     vertices.winner_ints[WINNER * v + PREDECESSOR] = v
     push_vertex(wave, v)

@@ -3,7 +3,7 @@
 import math
 
 from geodesic_core.kernels.fast.buckets import push
-from geodesic_core.kernels.front.counters import REACHED
+from geodesic_core.kernels.front.counters import TOUCHED
 from geodesic_core.kernels.front.relaxation import precedence, record_winner
 from geodesic_core.kernels.front.state import View
 from geodesic_core.kernels.front.window import Window, distance_at, emitted_window, reversed_window
@@ -153,9 +153,16 @@ def relax(
         vertices.distance[node] = distance
         if node < wave.sizes.vertices:
             if known == math.inf:
-                wave.counters[REACHED] += 1
+                note_reached(wave, node)
             if wave.mesh.flags[node] & (FANS | SEAM | PINCHED):
                 push_vertex(wave, node)
+
+
+@inlined
+def note_reached(wave: View, v: int) -> None:
+    """Put a vertex that had no distance among the touched ones."""
+    wave.vertices.touched[wave.counters[TOUCHED]] = v
+    wave.counters[TOUCHED] += 1
 
 
 @kernel

@@ -64,7 +64,9 @@ def new_wavefront(
             per_edge=places,
             buckets_per_unit=1.0 / bucket_width if bucket_width > 0.0 else 1.0,
         ),
-        vertices=new_vertices(nodes)._replace(crossing=np.zeros(nodes)),
+        vertices=new_vertices(nodes)._replace(
+            crossing=np.zeros(nodes), touched=np.empty(len(topology.total_angle), np.int32)
+        ),
         merges=NO_MERGES,
         sites=sites._replace(ints=own),
         counters=new_counters(),

@@ -44,12 +44,17 @@ def reach_sites_inside(
 
 @kernel
 def advance(topology: Topology, wavefront: Wavefront, bounds: Bounds, budget: int) -> Outcome:
+    """Run the sweep for a slice of work, see `run`. Modifies the wavefront."""
+    return run(view_of(topology, wavefront, bounds), budget)
+
+
+@kernel
+def run(wave: View, budget: int) -> Outcome:
     """Cross edges with ``budget`` windows, or with all that wait; return the outcome.
 
     A slice that ends for want of room has changed nothing since its last whole step. Modifies the
     wavefront.
     """
-    wave = view_of(topology, wavefront, bounds)
     rows, counters = wave.pool.windows, wave.counters
     counters[WORK] = 0
     slot = first_waiting(wave)

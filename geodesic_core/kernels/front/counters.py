@@ -19,24 +19,23 @@ PROPAGATED = 8  # windows that crossed a face
 
 # Vertices
 TOUCHED = 9
-REACHED = 10  # in a fast sweep
-SETTLED_VERTICES = 11
+SETTLED_VERTICES = 10
 
 # The heap and the ring
-HEAP_SIZE = 12
-RING_HEAD = 13
-RING_SIZE = 14
+HEAP_SIZE = 11
+RING_HEAD = 12
+RING_SIZE = 13
 
 # The buckets of a fast sweep
-CURRENT = 15  # bucket that is being emptied, counted from distance 0
-IN_BUCKETS = 16  # windows that wait in the ring of buckets
-FAR_FIRST = 17  # slot of the first window beyond the ring, -1 if there is none
-FAR_BUCKET = 18  # the nearest bucket of those
+CURRENT = 14  # bucket that is being emptied, counted from distance 0
+IN_BUCKETS = 15  # windows that wait in the ring of buckets
+FAR_FIRST = 16  # slot of the first window beyond the ring, -1 if there is none
+FAR_BUCKET = 17  # the nearest bucket of those
 
 # Whether sources were added later, so that lists may wait for an end that is not settled anew
-ADDED = 19
+ADDED = 18
 
-COUNTERS = 20
+COUNTERS = 19
 
 
 def new_counters() -> Longs:

@@ -16,6 +16,7 @@ from geodesic_core.kernels.front.state import (
     ENTRY_EDGE,
     FACE,
     FAR,
+    IN_RING,
     LIT_FROM,
     LIT_TO,
     MARKS,
@@ -140,13 +141,36 @@ def may_pass(wave: View, v: int) -> bool:
 
 @kernel
 def forget(topology: Topology, wavefront: Wavefront) -> None:
-    """Reset the wavefront to its first state, in time proportional to the vertices touched.
+    """Reset the wavefront to its first state, in time proportional to vertices touched, and sites.
 
     What it is to retain stays marked.
 
     Modifies the wavefront.
     """
     pool, vertices, sites = wavefront.pool, wavefront.vertices, wavefront.sites
+    merges = len(vertices.upper) > 0
+    forget_vertices(topology, wavefront)
+    for k in range(len(sites.ints)):
+        node, face = sites.ints[k, NODE], sites.ints[k, FACE]
+        vertices.distance[node] = math.inf
+        vertices.winner_ints[node, ENTRY_EDGE] = vertices.winner_ints[node, PREDECESSOR] = -1
+        if merges:
+            vertices.reference[node] = -1
+        for h in range(3 * face, 3 * face + 3):
+            pool.lists[h, MARKS] &= RETAINED
+    for k in range(len(sites.segment_ints)):
+        node = sites.segment_ints[k, NODE]
+        vertices.distance[node] = math.inf
+        vertices.winner_ints[node, ENTRY_EDGE] = vertices.winner_ints[node, PREDECESSOR] = -1
+
+
+@kernel
+def forget_vertices(topology: Topology, wavefront: Wavefront) -> None:
+    """Reset the wavefront, but for sites and segments. O(vertices touched).
+
+    Sites to reach stay marked as well. Modifies the wavefront.
+    """
+    pool, vertices = wavefront.pool, wavefront.vertices
     merges = len(vertices.upper) > 0
     for i in range(wavefront.counters[TOUCHED]):
         v = vertices.touched[i]
@@ -165,22 +189,10 @@ def forget(topology: Topology, wavefront: Wavefront) -> None:
             face = topology.corners[c] // 3
             for h in range(3 * face, 3 * face + 3):
                 pool.lists[h, SIZE] = 0
-                pool.lists[h, MARKS] &= RETAINED
+                pool.lists[h, MARKS] &= ~IN_RING
                 if topology.flags[v] & (SEAM | PINCHED):
                     pool.crossings[h] = -1
                 pool.runs[h] = 0
-    for k in range(len(sites.ints)):
-        node, face = sites.ints[k, NODE], sites.ints[k, FACE]
-        vertices.distance[node] = math.inf
-        vertices.winner_ints[node, ENTRY_EDGE] = vertices.winner_ints[node, PREDECESSOR] = -1
-        if merges:
-            vertices.reference[node] = -1
-        for h in range(3 * face, 3 * face + 3):
-            pool.lists[h, MARKS] &= RETAINED
-    for k in range(len(sites.segment_ints)):
-        node = sites.segment_ints[k, NODE]
-        vertices.distance[node] = math.inf
-        vertices.winner_ints[node, ENTRY_EDGE] = vertices.winner_ints[node, PREDECESSOR] = -1
     for i in range(COUNTERS):
         wavefront.counters[i] = 0
     wavefront.counters[FREE_FIRST] = wavefront.counters[FAR_FIRST] = -1

@@ -149,26 +149,35 @@ def reach_inside(wave: View, first: int, delivery: Delivery) -> None:
     They come from the corners of their faces, or from sources and segments in the same face.
     Modifies the nodes of the sites.
     """
-    mesh, sites = wave.mesh, wave.sites
     for k in range(first, wave.sizes.sites):
-        node, face = sites.ints[SITE * k + NODE], sites.ints[SITE * k + FACE]
-        for h in range(3 * face, 3 * face + 3):
-            x, y = weights_in_frame(mesh.geometry, sites.weights, 3 * k, h)
-            corner, reach = mesh.links[ROW * h + TAIL], math.hypot(x, y)
-            delivery.reach_straight(wave, node, reach, h, 0.0, 0.0, corner)
-        h = 3 * face
+        reach_site_inside(wave, k, 0, first, delivery)
+
+
+@kernel
+def reach_site_inside(wave: View, k: int, first: int, last: int, delivery: Delivery) -> None:
+    """Offer the site of row k such paths; rows from ``first`` to before ``last`` are of sources.
+
+    Modifies its node.
+    """
+    mesh, sites = wave.mesh, wave.sites
+    node, face = sites.ints[SITE * k + NODE], sites.ints[SITE * k + FACE]
+    for h in range(3 * face, 3 * face + 3):
         x, y = weights_in_frame(mesh.geometry, sites.weights, 3 * k, h)
-        for source in range(first):
-            if sites.ints[SITE * source + FACE] == face:
-                root = sites.ints[SITE * source + NODE]
-                sx, sy = weights_in_frame(mesh.geometry, sites.weights, 3 * source, h)
-                reach = math.hypot(x - sx, y - sy)
-                delivery.reach_straight(wave, node, reach, h, sx, sy, root)
-        for segment in range(wave.sizes.segments):
-            if sites.segment_ints[SEGMENT * segment + FACE] == face:
-                root = sites.segment_ints[SEGMENT * segment + NODE]
-                reach = distance_to_segment(mesh.geometry, sites.segment_ends, segment, h, x, y)
-                delivery.reach_straight(wave, node, reach, h, 0.0, 0.0, root)
+        corner, reach = mesh.links[ROW * h + TAIL], math.hypot(x, y)
+        delivery.reach_straight(wave, node, reach, h, 0.0, 0.0, corner)
+    h = 3 * face
+    x, y = weights_in_frame(mesh.geometry, sites.weights, 3 * k, h)
+    for source in range(first, last):
+        if sites.ints[SITE * source + FACE] == face:
+            root = sites.ints[SITE * source + NODE]
+            sx, sy = weights_in_frame(mesh.geometry, sites.weights, 3 * source, h)
+            reach = math.hypot(x - sx, y - sy)
+            delivery.reach_straight(wave, node, reach, h, sx, sy, root)
+    for segment in range(wave.sizes.segments):
+        if sites.segment_ints[SEGMENT * segment + FACE] == face:
+            root = sites.segment_ints[SEGMENT * segment + NODE]
+            reach = distance_to_segment(mesh.geometry, sites.segment_ends, segment, h, x, y)
+            delivery.reach_straight(wave, node, reach, h, 0.0, 0.0, root)
 
 
 @kernel

@@ -186,11 +186,11 @@ class Vertices(NamedTuple):
     """(N,): turn of the winning window, radians; NaN where the way crosses no edge, or bends"""
     mirrored: Flags
     """(N,): whether its frame is seen in the mirror"""
+    touched: Ints
+    """(V,): the vertices that are not as they were at first"""
     # The following are ABSENT from a fast sweep.
     status: Flags
     """(V,): FAR, SEEN, FRONT or SETTLED"""
-    touched: Ints
-    """(V,): the vertices that are not as they were at first"""
     heuristic: Floats
     """(V,): lower bound of the rest of a path from a touched vertex on; empty unless pruned"""
     # The following are empty unless the sweep merges.

@@ -262,6 +262,13 @@ def reaches(window: Window, limit: float) -> bool:
 
 
 @inlined
+def is_beyond(wave: View, window: Window) -> bool:
+    """Whether the least distance over the window is beyond the limit of the sweep."""
+    limit = wave.bounds.max_distance
+    return limit < math.inf and not reaches(window, limit)
+
+
+@inlined
 def is_within(window: Window, x: float, limit: float) -> bool:
     """Whether the distance at (x, 0) is within ``limit``."""
     sx, sy = window.sx, window.sy

@@ -4,6 +4,8 @@ from geodesic_core.arrays import Floats, Ints
 from geodesic_core.kernels.front.bounds import Bounds
 from geodesic_core.kernels.front.counters import (
     ADDED,
+    FREE_SIZE,
+    FRESH,
     HEAP_SIZE,
     RING_HEAD,
     RING_SIZE,
@@ -80,17 +82,22 @@ def reach_sites_inside(
 
 @kernel
 def advance(topology: Topology, wavefront: Wavefront, bounds: Bounds, budget: int) -> Outcome:
+    """Run the sweep for a slice of work, see `run`. Modifies the wavefront."""
+    return run(view_of(topology, wavefront, bounds), budget)
+
+
+@kernel
+def run(wave: View, budget: int) -> Outcome:
     """Run the sweep for a slice of about ``budget`` units of 10 ns; return its outcome (3.4).
 
     Lists in the ring come first; then, again and again, the nearest vertex is settled and the ring
     drained. A slice that ends for want of room has changed nothing since its last whole step.
     Modifies the wavefront.
 
-    Windows wholly beyond ``max_distance`` are dropped. Vertices beyond it are reached and settled
-    all the same, for a list waits for an end of its edge, and windows between two far ends may be
-    near; the caller takes their distances away.
+    Windows wholly beyond ``max_distance`` are dropped. Vertices beyond it are reached all the same,
+    and settled while windows are left, for a list waits for an end of its edge, and windows between
+    two far ends may be near; the caller takes their distances away.
     """
-    wave = view_of(topology, wavefront, bounds)
     wave.counters[WORK] = 0
     outcome = drain(wave, budget)
     while outcome == Outcome.FINISHED and is_unfinished(wave):
@@ -106,9 +113,14 @@ def advance(topology: Topology, wavefront: Wavefront, bounds: Bounds, budget: in
 @inlined
 def is_unfinished(wave: View) -> bool:
     """Whether vertices are to be settled, or else lists propagated that still waited."""
-    if wave.counters[HEAP_SIZE] > 0:
-        return True
-    return wave.counters[ADDED] > 0 and queue_waiting(wave) > 0
+    counters = wave.counters
+    if counters[HEAP_SIZE] > 0:
+        # Neither a window nor a vertex that is left is within the limit.
+        is_over = counters[FRESH] == counters[FREE_SIZE] and (
+            wave.queues.heap_keys[0] > wave.bounds.max_distance
+        )
+        return not is_over
+    return counters[ADDED] > 0 and queue_waiting(wave) > 0
 
 
 @kernel

@@ -8,6 +8,7 @@ from geodesic_core.kernels.front.sites import Delivery
 from geodesic_core.kernels.front.state import View, merging, mirrors, source_weight
 from geodesic_core.kernels.front.window import (
     Window,
+    is_beyond,
     load_window,
     ray_from,
     referring_to,
@@ -61,7 +62,7 @@ def send_out(wave: View, out: int, g: int, window: Window) -> None:
 
     Modifies the lists beyond it.
     """
-    if out == NO_FACE:
+    if out == NO_FACE or is_beyond(wave, window):
         return
     mesh = wave.mesh
     wave.counters[CREATED] += 1

@@ -7,7 +7,15 @@ from geodesic_core.kernels.front.directions import turned_by, turns_to_sides
 from geodesic_core.kernels.front.pool import put_window
 from geodesic_core.kernels.front.sides import Side, left_of, right_of
 from geodesic_core.kernels.front.state import FIRST, LAST, LIST, SIZE, View, merging
-from geodesic_core.kernels.front.window import INTS, NEXT, Window, at_sigma, load_window, seen_over
+from geodesic_core.kernels.front.window import (
+    INTS,
+    NEXT,
+    Window,
+    at_sigma,
+    is_beyond,
+    load_window,
+    seen_over,
+)
 from geodesic_core.kernels.front.window_lists import queue_if_due
 from geodesic_core.kernels.jit import as_ints, inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import (
@@ -68,8 +76,8 @@ def spread(wave: View, h: int, count: int, nearest: int, crossing: float, least:
             if not goes_left and window.b0 < crossing:
                 goes_left = not is_beaten(wave, window, nearest, crossing, window.b0)
         elif i != nearest:
-            is_beyond = window.b0 >= crossing if goes_left else window.b1 <= crossing
-            if is_beyond and bent_distance(window, ax, ay)[0] >= least:
+            is_aside = window.b0 >= crossing if goes_left else window.b1 <= crossing
+            if is_aside and bent_distance(window, ax, ay)[0] >= least:
                 continue
         if goes_left:
             to_left = send_over_edge(wave, to_left, left, turned_by(window, turns[0]), covers)
@@ -113,7 +121,10 @@ def send_over_edge(wave: View, chain: Chain, side: Side, window: Window, covers:
     if side.is_right:  # from the apex on; in this order, which fixes how it rounds
         along = side.length * weight - offset * side.cosine - sy * side.sine
         u0, u1 = side.length - u1, side.length - u0
-    slot = put_window(wave, seen_over(window, u0, u1, along, depth))
+    onward = seen_over(window, u0, u1, along, depth)
+    if is_beyond(wave, onward):
+        return chain
+    slot = put_window(wave, onward)
     if chain.size == 0:
         return Chain(slot, slot, 1)
     as_ints(wave.pool.windows)[INTS * chain.last + NEXT] = slot

@@ -1,6 +1,5 @@
 """The list of one half-edge trimmed, filtered and, in a merging sweep, merged (3.3, 3.4, 4.1)."""
 
-import math
 from typing import NamedTuple
 
 from geodesic_core.kernels.front.counters import MERGES
@@ -29,9 +28,9 @@ from geodesic_core.kernels.front.window import (
     NO_WINDOW,
     Window,
     between,
+    is_beyond,
     is_within,
     load_window,
-    reaches,
     referring_to,
     store_window,
 )
@@ -90,14 +89,13 @@ def trim_list(wave: View, h: int) -> int:
     Filters apply at both ends of the list only, where nearly all that they find lies. Modifies
     scratch, and the record of merges.
     """
-    pool, max_distance = wave.pool, wave.bounds.max_distance
-    limits, limited = limits_of(wave, h), max_distance < math.inf
+    pool, limits = wave.pool, limits_of(wave, h)
     last, count = NO_WINDOW, 0  # the window last stored in scratch, and how many are there
     slot = pool.lists[LIST * h + FIRST]
     for _ in range(pool.lists[LIST * h + SIZE]):
         new = load_window(wave, pool.windows, slot)
         slot = as_ints(pool.windows)[INTS * slot + NEXT]
-        if limited and not reaches(new, max_distance):
+        if is_beyond(wave, new):  # by a limit that has become narrower
             continue
         last, new, count = trim_against_earlier(wave, limits, last, new, count)
         if new.b1 <= new.b0:

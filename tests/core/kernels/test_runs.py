@@ -7,6 +7,7 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.control import Control
+from geodesic_core.fields import fast_sweep
 from geodesic_core.kernels.front import state
 from geodesic_core.kernels.front.state import new_wavefront
 from geodesic_core.search.landmarks import Landmarks
@@ -52,6 +53,42 @@ def test_most_runs_are_what_a_list_may_come_up(monkeypatch, left):
     else:
         with pytest.raises(gc.errors.InternalError, match=r"circles through face \d+; .*fast_dist"):
             gc.exact_distance(mesh, 3)
+
+
+@pytest.mark.usefixtures("worn_out")
+def test_rows_whose_runs_are_used_up_begin_anew_exactly():
+    """The first of them: it leaves memory as new to the next."""
+    mesh = gc.samples.knot(500)
+    points = [3, gc.SurfacePoint.face(50, (0.2, 0.3, 0.5)), 200]
+    shares = []
+    for limit in (None, 0.3 * mesh.diagonal):
+        ask = {"max_distance": limit, "threads": 1}
+        shares.clear()
+        table = gc.distance_matrix(
+            mesh, points, points[:2], method="approximate", progress=shares.append, **ask
+        )
+        exact = gc.distance_matrix(mesh, points, points[:2], **ask)
+        assert table[:, 0].tobytes() == exact[:, 0].tobytes()
+        near = np.isfinite(exact[:, 1])
+        np.testing.assert_allclose(table[near, 1], exact[near, 1], rtol=1e-3)
+        assert shares == sorted(shares)
+
+
+def test_rows_of_a_sweep_that_does_not_end_are_an_error(monkeypatch):
+    mesh = gc.samples.knot(500)
+
+    def new_used_wavefront(*args, **kwargs):
+        wave = new_wavefront(*args, **kwargs)
+        wave.pool.runs[:] = MOST_RUNS
+        return wave
+
+    with monkeypatch.context() as patch:
+        patch.setattr(state, "new_wavefront", new_used_wavefront)
+        with pytest.raises(gc.errors.InternalError, match=r"circles through face \d+"):
+            gc.distance_matrix(mesh, [3], [5, 200])
+    monkeypatch.setattr(fast_sweep, "MOST_CROSSINGS", 0)
+    with pytest.raises(gc.errors.InternalError, match="its windows go in circles"):
+        gc.distance_matrix(gc.samples.sphere(20_000), [3], [5, 200], method="fast")
 
 
 @pytest.mark.usefixtures("worn_out")

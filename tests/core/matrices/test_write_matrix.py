@@ -18,11 +18,11 @@ import zarr
 from scipy.sparse import load_npz
 
 import geodesic_core as gc
-from geodesic_core.matrices import matrix_file, plan, threads
+from geodesic_core.matrices import driver, matrix_file, plan, threads
 from geodesic_core.matrices.blocks import Blocks
 from geodesic_core.matrices.formats import sha256_of
 from geodesic_core.matrices.plan import sweep_order
-from geodesic_core.matrices.rows import ExactRows
+from geodesic_core.search.target_sweep import TargetSweep
 from tests.core.fields.test_points import EXACT
 from tests.support import zoo
 from tests.support.faults import flip_bytes
@@ -56,6 +56,7 @@ def read(path: Path, shape: tuple[int, int]) -> np.ndarray:
 @pytest.fixture
 def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plan, "_BLOCK_ROWS", 3)
+    monkeypatch.setattr(driver, "_PART_ROWS", 1)
 
 
 @pytest.fixture(scope="module")
@@ -214,15 +215,16 @@ class Stopped:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.rows, self.end = 0, math.inf
-        distances = ExactRows.distances
+        rows = TargetSweep.rows
 
         def counted(*arguments):
             if self.rows == self.end:  # a call asks `cancel` by the clock, not after each row
                 raise gc.errors.Cancelled("cancelled by the test")
             self.rows += 1
-            return distances(*arguments)
+            return rows(*arguments)
 
-        monkeypatch.setattr(ExactRows, "distances", counted)
+        monkeypatch.setattr(driver, "_PART_ROWS", 1)
+        monkeypatch.setattr(TargetSweep, "rows", counted)
 
     def write(self, mesh: gc.TriangleMesh, out: Path, after: int, **options) -> None:
         """Write until so many rows more are done."""
@@ -265,6 +267,7 @@ def test_rows_are_kept_once_their_time_has_come(mesh, tmp_path, monkeypatch):
         assert block == 0
         kept.append(len(rows))
 
+    monkeypatch.setattr(driver, "_PART_ROWS", 1)
     monkeypatch.setattr(Blocks, "keep", keep)
     gc.write_matrix(mesh, tmp_path / "table.npy", range(20), threads=1)
     assert kept == []

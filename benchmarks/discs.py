@@ -1,0 +1,208 @@
+"""Small discs and whole rows of a real cortex, beside Connectome Workbench."""
+
+import math
+import os
+import resource
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import nibabel
+import numpy as np
+
+import geodesic_core as gc
+from benchmarks.inputs import Inputs
+from benchmarks.tables import Section, verdict
+from geodesic_core.arrays import Longs
+
+brain: Any = nibabel  # of whose types little is declared
+
+COMMAND = "wb_command"
+"""Of Connectome Workbench: the package ``connectome-workbench`` of Debian"""
+SURFACE, THICKNESS = "white_right.gii.gz", "thick_right.gii.gz"
+"""Of fsaverage5, which comes with nilearn"""
+RADII = {0.5: "", 10.0: "discs", 20.0: ""}
+"""Millimetres"""
+ROWS = 200
+"""Whole rows, of sources all over the surface"""
+METHODS: dict[str, dict[str, Any]] = {
+    "exact": {},
+    "fast, effort=1": {"method": "fast", "effort": 1},
+    "approximate": {"method": "approximate"},
+}
+AT_MOST = {"exact": 3.5, "fast, effort=1": 1.2}
+"""Times of Workbench's processor time for discs of 10 mm"""
+
+
+def run(_inputs: Inputs, runs: int) -> Section:
+    """Time all pairs within some radii, whole rows, and all pairs, each method by turns."""
+    folder = _data()
+    mesh = gc.load_mesh(folder / SURFACE)
+    thickness = brain.load(folder / THICKNESS).agg_data()
+    cortex = np.flatnonzero(thickness > 0)
+    gc.warm_up()
+    peer = shutil.which(COMMAND)
+    if peer is None:
+        print(f"{COMMAND} is not installed: the column of Connectome Workbench stays empty")
+    with tempfile.TemporaryDirectory() as scratch:
+        workbench = None if peer is None else _Workbench(Path(scratch), mesh, cortex)
+        rows = [_discs(mesh, cortex, radius, workbench, runs) for radius in RADII]
+        rows.append(_whole(mesh, cortex, workbench, runs))
+    rows.append(_symmetric(mesh, cortex))
+    return Section(
+        "Small discs",
+        f"Distances on the right white surface of fsaverage5 ({len(mesh.vertices):,} vertices) "
+        f"between its {len(cortex):,} vertices of cortex, in one thread: all pairs within a radius "
+        f"as a sparse matrix, {ROWS} whole rows, and all pairs beside as many rows of the full "
+        "square; microseconds of processor time for each source, medians of "
+        f"{runs} by turns. Workbench writes a dense file within that time, and its distances are "
+        "a few per cent too long. The surface has so many sharp saddles that approximate sweeps "
+        "are exact ones.",
+        ["distances", "pairs a source", *METHODS, "Workbench"],
+        rows,
+    )
+
+
+def _data() -> Path:
+    """Return the folder of fsaverage5 in the package nilearn, which need not be imported."""
+    spec = find_spec("nilearn")
+    if spec is None or spec.origin is None:
+        raise SystemExit("discs: nilearn is not installed: run scripts/bench discs")
+    return Path(spec.origin).parent / "datasets" / "data" / "fsaverage5"
+
+
+def _discs(
+    mesh: gc.TriangleMesh,
+    cortex: Longs,
+    radius: float,
+    workbench: "_Workbench | None",
+    runs: int,
+) -> list[str]:
+    calls: dict[str, Callable[[], Any]] = {
+        name: partial(
+            gc.distance_matrix,
+            mesh,
+            cortex,
+            max_distance=radius,
+            layout="sparse",
+            threads=1,
+            **options,
+        )
+        for name, options in METHODS.items()
+    }
+    if workbench is not None:
+        calls["Workbench"] = partial(workbench.all_to_all, radius)
+    seconds, results = _by_turns(calls, runs)
+    pairs = results["exact"].nnz / len(cortex)
+    limits = AT_MOST if RADII[radius] else {}
+    return [f"within {radius:g} mm", f"{pairs:.0f}", *_cells(seconds, len(cortex), limits)]
+
+
+def _whole(
+    mesh: gc.TriangleMesh, cortex: Longs, workbench: "_Workbench | None", runs: int
+) -> list[str]:
+    some = cortex[:: len(cortex) // ROWS][:ROWS]
+    calls: dict[str, Callable[[], Any]] = {
+        name: partial(gc.distance_matrix, mesh, some, cortex, threads=1, **options)
+        for name, options in METHODS.items()
+    }
+    seconds, _ = _by_turns(calls, runs)
+    if workbench is not None:  # all rows, once
+        whole, _ = _by_turns({"Workbench": partial(workbench.all_to_all, math.inf)}, 1)
+        seconds |= {"Workbench": whole["Workbench"] * ROWS / len(cortex)}
+    return ["whole rows", f"{len(cortex):,}", *_cells(seconds, ROWS, {})]
+
+
+def _symmetric(mesh: gc.TriangleMesh, cortex: Longs) -> list[str]:
+    """Return the row of all pairs of every tenth vertex, as a share of those of two equal sets."""
+    some = cortex[::10]
+    cells = []
+    for options in METHODS.values():
+        ask = partial(gc.distance_matrix, mesh, some, threads=1, **options)
+        seconds, _ = _by_turns({"own": ask, "square": partial(ask, some[::-1])}, 1)
+        cells.append(f"{seconds['own'] / seconds['square']:.2f} ×")
+    return ["one set, of the full square", f"{len(some):,}", *cells, ""]
+
+
+def _by_turns(
+    calls: dict[str, Callable[[], Any]], runs: int
+) -> tuple[dict[str, float], dict[str, Any]]:
+    """Return the median processor seconds of calls by turns, those of processes included."""
+    seconds: dict[str, list[float]] = {name: [] for name in calls}
+    results: dict[str, Any] = {}
+    for _ in range(runs):
+        for name, call in calls.items():
+            began = _all_processor_s()
+            results[name] = call()
+            seconds[name].append(_all_processor_s() - began)
+    return {name: median(some) for name, some in seconds.items()}, results
+
+
+def _all_processor_s() -> float:
+    own, ended = (
+        resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    )
+    return own.ru_utime + own.ru_stime + ended.ru_utime + ended.ru_stime
+
+
+def _cells(seconds: dict[str, float], sources: int, limits: dict[str, float]) -> list[str]:
+    """Return the microseconds of each method for a source, and its multiple of Workbench's time."""
+    peer = seconds.get("Workbench", math.nan)
+    cells = []
+    for name in METHODS:
+        cell = f"{1e6 * seconds[name] / sources:,.0f}"
+        if not math.isnan(peer):
+            cell += f" ({seconds[name] / peer:.2f} ×"
+            if name in limits:
+                cell += f", {verdict(seconds[name] / peer, limits[name], at_least=False)}"
+            cell += ")"
+        cells.append(cell)
+    return [*cells, "absent" if math.isnan(peer) else f"{1e6 * peer / sources:,.0f}"]
+
+
+class _Workbench:
+    """Connectome Workbench, whose surface and region are files."""
+
+    def __init__(self, folder: Path, mesh: gc.TriangleMesh, cortex: Longs) -> None:
+        self._folder = folder
+        inside = np.zeros(len(mesh.vertices), np.float32)
+        inside[cortex] = 1.0
+        self._save(
+            "white.surf.gii",
+            (mesh.vertices.astype(np.float32), "NIFTI_INTENT_POINTSET"),
+            (mesh.faces.astype(np.int32), "NIFTI_INTENT_TRIANGLE"),
+        )
+        self._save("cortex.shape.gii", (inside, "NIFTI_INTENT_SHAPE"))
+
+    def _save(self, name: str, *arrays: tuple[Any, str]) -> None:
+        parts = [brain.gifti.GiftiDataArray(values, intent=intent) for values, intent in arrays]
+        image = brain.gifti.GiftiImage(darrays=parts)
+        image.meta["AnatomicalStructurePrimary"] = "CortexRight"
+        brain.save(image, self._folder / name)
+
+    def _run(self, *arguments: str) -> None:
+        subprocess.run(
+            [COMMAND, *arguments],
+            cwd=self._folder,
+            env=os.environ | {"OMP_NUM_THREADS": "1"},
+            check=True,
+            capture_output=True,
+        )
+
+    def all_to_all(self, radius: float) -> None:
+        """Write all distances within a radius, and -1 elsewhere, as a dense file."""
+        limit = [] if math.isinf(radius) else ["-limit", f"{radius:g}"]
+        self._run(
+            "-surface-geodesic-distance-all-to-all",
+            "white.surf.gii",
+            "near.dconn.nii",
+            *limit,
+            "-roi",
+            "cortex.shape.gii",
+        )
