@@ -118,6 +118,10 @@ def _loops() -> None:
     handle_loops(samples.knot(500))
 
 
+def _certificates() -> None:
+    exact_distance(_mesh(), 0, retain="windows").certify()
+
+
 WORKLOADS: dict[str, Callable[[], None]] = {
     "exact": _exact,
     "approximate": _approximate,
@@ -131,6 +135,7 @@ WORKLOADS: dict[str, Callable[[], None]] = {
     "maps": _maps,
     "cuts": _cuts,
     "loops": _loops,
+    "certificates": _certificates,
 }
 """Calls that together use all kernels, in an order that suits two processes.
 
@@ -149,7 +154,7 @@ def compile_kernels(
     workloads
         Kinds of calls to compile for: ``"exact"``, ``"approximate"``, ``"paths"``, ``"curves"``,
         ``"approximate-curves"``, ``"fast"``, ``"fast-curves"``, ``"isolines"``, ``"borders"``,
-        ``"maps"``, ``"cuts"`` and ``"loops"``; None for all.
+        ``"maps"``, ``"cuts"``, ``"loops"`` and ``"certificates"``; None for all.
     cancel
         Called before compilation begins and then ten times a second; compilation ends once it
         returns True. Not called where no kernel is missing.

@@ -36,7 +36,7 @@ PER_FACE_SCANNED = 0.02e-6
 """To look for the boundary, or for a level of given values: for each face."""
 PER_FACE_STORED = 3e-6
 """To make a mesh and to store it: for each of its faces."""
-PER_FACE_CERTIFIED = 0.5e-3
+PER_FACE_CERTIFIED = 30e-6
 """To prove distances and to measure paths to all vertices: for each face, however few are swept."""
 PER_PATH = 0.3e-3
 """To trace a path, and to describe it."""

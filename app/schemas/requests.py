@@ -156,7 +156,7 @@ class DistancesRequest(AccuracyOrEffort, AmongBarriers):
     certify: StrictBool = Field(
         default=False,
         description="Also prove the distances of vertices, for `exact` and `approximate`, from "
-        "sources that are points. It takes about half a millisecond a face. The answer has a "
+        "sources that are points. It takes about fifteen times as long. The answer has a "
         "`certificate`, and as `npz` it is the file that `geodesic-verify` checks",
     )
 

@@ -1287,7 +1287,7 @@ export interface components {
             include?: ("nearest_source" | "gradient" | "lower" | "upper" | "violations")[];
             /**
              * Certify
-             * @description Also prove the distances of vertices, for `exact` and `approximate`, from sources that are points. It takes about half a millisecond a face. The answer has a `certificate`, and as `npz` it is the file that `geodesic-verify` checks. Default: `false`
+             * @description Also prove the distances of vertices, for `exact` and `approximate`, from sources that are points. It takes about fifteen times as long. The answer has a `certificate`, and as `npz` it is the file that `geodesic-verify` checks. Default: `false`
              */
             certify?: boolean;
         };
