@@ -17,6 +17,7 @@ import numpy as np
 from geodesic_core import samples
 from geodesic_core.control import Control
 from geodesic_core.errors import InternalError, InvalidArgument
+from geodesic_core.fields.scalar_field import ScalarField
 from geodesic_core.kernels.jit import cache, machine, progress
 from geodesic_core.matrices.threads import available_cores
 from geodesic_core.mesh.surface_point import Curve, SurfacePoint
@@ -27,6 +28,7 @@ from geodesic_core.solvers import (
     cut,
     distance_matrix,
     exact_distance,
+    farthest_points,
     fast_distance,
     handle_loops,
     log_map,
@@ -82,7 +84,9 @@ def _fast_curves() -> None:
 
 
 def _isolines() -> None:
-    exact_distance(_mesh(), 0).isolines([0.1])
+    mesh = _mesh()
+    exact_distance(mesh, 0).isolines([0.1])
+    ScalarField(mesh, mesh.vertices[:, 0]).isolines([0.1])
 
 
 def _borders() -> None:
@@ -118,6 +122,10 @@ def _loops() -> None:
     handle_loops(samples.knot(500))
 
 
+def _samples() -> None:
+    farthest_points(_mesh(), 2)
+
+
 def _certificates() -> None:
     exact_distance(_mesh(), 0, retain="windows").certify()
 
@@ -136,6 +144,7 @@ WORKLOADS: dict[str, Callable[[], None]] = {
     "cuts": _cuts,
     "loops": _loops,
     "certificates": _certificates,
+    "samples": _samples,
 }
 """Calls that together use all kernels, in an order that suits two processes.
 
@@ -154,7 +163,8 @@ def compile_kernels(
     workloads
         Kinds of calls to compile for: ``"exact"``, ``"approximate"``, ``"paths"``, ``"curves"``,
         ``"approximate-curves"``, ``"fast"``, ``"fast-curves"``, ``"isolines"``, ``"borders"``,
-        ``"maps"``, ``"cuts"``, ``"loops"`` and ``"certificates"``; None for all.
+        ``"maps"``, ``"cuts"``, ``"loops"``, ``"certificates"`` and ``"samples"``;
+        None for all.
     cancel
         Called before compilation begins and then ten times a second; compilation ends once it
         returns True. Not called where no kernel is missing.

@@ -135,7 +135,7 @@ def as_lengths(length: ArrayLike, count: int) -> Floats:
         lengths = np.array(np.nan)
     if lengths.shape not in ((), (count,)) or not (np.isfinite(lengths) & (lengths >= 0.0)).all():
         raise InvalidArgument(f"length must be a finite number, 0 or more, or {count} of them")
-    return np.broadcast_to(lengths, (count,))
+    return np.broadcast_to(lengths, (count,)).copy()  # kernels are compiled for arrays of their own
 
 
 def lines_from(
