@@ -68,7 +68,7 @@ FALSE_POSITION_STEPS = 100
 """Steps of false position after which the bisector is taken as it is; it needs less than ten."""
 
 HALF_ULP = 2.0**-53
-"""Relative rounding of one operation, at which false position ends."""
+"""Relative rounding of one operation, at which false position ends; certificates count it."""
 
 GAP = 1e-12
 """Share of an edge's length up to which a gap between two windows is rounding and is closed.

@@ -69,13 +69,13 @@ class DistancesQuery(FromSources[DistancesRequest]):
 
     def check_format(self, media_type: str) -> None:
         """Refuse a second array in binary, one by face in tables, and a proof that is rounded."""
+        if media_type != JSON and _VIOLATIONS in self.request.include:
+            raise invalid_fields(["/include"], "violations are values of faces; ask for json")
         message = "does not come with a bare array; ask for json, csv or ply"
         faults = [Fault("/include", f"{name} {message}") for name in self.request.include]
         if faults and media_type in (NPY, OCTETS, NPZ):
             detail = "the proof" if media_type == NPZ else "one array"
             raise problem("invalid_request", f"{media_type} holds {detail}", errors=tuple(faults))
-        if media_type in (CSV, PLY) and _VIOLATIONS in self.request.include:
-            raise invalid_fields(["/include"], "violations are values of faces; ask for json")
         if media_type == NPZ and self.representation.dtype != Representation.dtype:
             raise invalid_fields(["/query/dtype"], "a proof is in float64")
 

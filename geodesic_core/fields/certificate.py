@@ -302,7 +302,7 @@ def _upper_bounds(
     in_slices(len(ends), measure, control)
     if not np.isfinite(lengths).all():
         lost = ends[np.isinf(lengths)][0]
-        raise InternalError(f"the path to vertex {lost} is none; please report this mesh")
+        raise InternalError(f"the path to vertex {lost} cannot be traced; please report this mesh")
     upper[ends] = np.minimum(upper[ends], lengths)
     upper = upper[surface.label]
     spread = np.linspace(0, len(ends) - 1, min(_SAVED_PATHS, len(ends))).astype(int)

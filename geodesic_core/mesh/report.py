@@ -1,7 +1,7 @@
 """Reports on meshes: counts and defects with the ids at fault, and their remedies."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
@@ -157,8 +157,10 @@ class _Edges(NamedTuple):
     """(E,)"""
     is_same_way: NDArray[np.bool_]
     """(E,): whether an edge has two faces, which run it the same way"""
-    of_side: Callable[[], Longs]
-    """Returns (3 F,): the edge of each side, three a face"""
+    keys: NDArray[np.uint64]
+    """(E,): both ends of each in one number"""
+    keys_of_sides: NDArray[np.uint64]
+    """(3 F,): that of the edge of each side, three a face"""
 
 
 def _edges_of(faces: Ints) -> _Edges:
@@ -176,7 +178,8 @@ def _edges_of(faces: Ints) -> _Edges:
         np.stack([edges >> np.uint64(32), edges & np.uint64(2**32 - 1)], axis=1).astype(np.int64),
         face_count,
         (face_count == 2) & (upward != 1),
-        lambda: np.searchsorted(edges, keys),
+        edges,
+        keys,
     )
 
 
@@ -214,7 +217,8 @@ def report_of(
         seams = seams_of(embedding, used, first_used)
     else:
         edge_lengths, first_used, seams = np.empty(len(edges.ends)), used, NO_SEAMS
-        edge_lengths[edges.of_side()] = lengths[surface].reshape(-1)
+        places = np.searchsorted(edges.keys, edges.keys_of_sides)
+        edge_lengths[places] = lengths[surface].reshape(-1)
     lowest = used[np.unique(topology.component[used], return_index=True)[1]]
     polygons = np.zeros(0) if face_map is None else np.bincount(face_map)
     low, high = vertices.min(axis=0), vertices.max(axis=0)

@@ -166,8 +166,11 @@ def test_only_proofs_come_as_archives_and_whole(client: TestClient, knot: str) -
         assert [fault["pointer"] for fault in problem["errors"]] == [place]
     check_problem(distances(client, knot, NPY, **proof, include=["upper"]), 422, "invalid_request")
     by_face = proof | {"include": ["violations"]}
-    table = client.post(f"/v1/meshes/{knot}/distances?format=csv", json=by_face)
-    assert check_problem(table, 422, "invalid_request")["errors"][0]["pointer"] == "/include"
+    for name in ("csv", "ply", "npy", "npz"):
+        refused = client.post(f"/v1/meshes/{knot}/distances?format={name}", json=by_face)
+        (fault,) = check_problem(refused, 422, "invalid_request")["errors"]
+        assert fault["pointer"] == "/include"
+        assert fault["message"].endswith("ask for json")
 
 
 def test_its_values_count(tmp_path: Path) -> None:

@@ -22,9 +22,7 @@ from geodesic_core.kernels.jit import borrowed, inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL, Topology
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.paths.backtracing import Winners, trace_path
-
-U = 2.0**-53
-"""Relative rounding of an operation"""
+from geodesic_core.tolerances import HALF_ULP as U
 
 ROUNDED = 20.0 * U
 """Bound of the rounding of a segment's length, as a share of S"""
@@ -73,7 +71,9 @@ def measure_paths(
     targets: Ints,
     lengths: Floats,
 ) -> None:
-    """Fill ``lengths`` with upper bounds of the distances of nodes; infinite where a path is none.
+    """Fill ``lengths`` with upper bounds of the distances of nodes.
+
+    Infinite where no path can be traced.
 
     O(faces crossed).
     """

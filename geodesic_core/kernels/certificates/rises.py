@@ -35,9 +35,8 @@ from geodesic_core.arrays import Floats, Longs
 from geodesic_core.kernels.certificates.faces import Faces
 from geodesic_core.kernels.curves.rows import with_room
 from geodesic_core.kernels.jit import borrowed, inlined, kernel
+from geodesic_core.tolerances import HALF_ULP as U
 
-U = 2.0**-53
-"""Relative rounding of an operation"""
 TINY = 1e-140
 """Absolute rounding, where numbers underflow"""
 _SPLIT = 2.0**27 + 1.0
