@@ -4,8 +4,9 @@ import math
 
 from geodesic_core.kernels.fast.buckets import push
 from geodesic_core.kernels.front.counters import TOUCHED
+from geodesic_core.kernels.front.pruning import lower_bound_to_target, may_pass
 from geodesic_core.kernels.front.relaxation import precedence, record_winner
-from geodesic_core.kernels.front.state import View
+from geodesic_core.kernels.front.state import View, is_pruned
 from geodesic_core.kernels.front.window import Window, distance_at, emitted_window, reversed_window
 from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import (
@@ -62,8 +63,19 @@ def offer(wave: View, h: int, twin: int, length: float, window: Window) -> None:
     if won == 0 and is_far_nearer(wave, h, length, window):
         won, key = AT_LARGE, distance_at(window, 0.5 * (window.b0 + window.b1))
         wave.places.at_large[h] += 1
-    if won and key <= wave.bounds.max_distance:
+    if won and may_go_on(wave, h, length, key):
         push(wave, h, window, won, key)
+
+
+@inlined
+def may_go_on(wave: View, h: int, length: float, key: float) -> bool:
+    """Whether a window is within the limit and, where the sweep is pruned, may be on the way."""
+    if not is_pruned(wave):
+        return key <= wave.bounds.max_distance
+    heuristic, row = wave.vertices.heuristic, ROW * h
+    tail, head = wave.mesh.links[row + TAIL], wave.mesh.links[row + HEAD]
+    rest = max(heuristic[tail], heuristic[head]) - length
+    return key + rest <= wave.bounds.pruning.limit
 
 
 @inlined
@@ -99,7 +111,7 @@ def offer_end(wave: View, h: int, twin: int, length: float, root: int, is_tail: 
             wave.places.values[wave.places.per_edge * h + k] = distance
             won |= 1 << k
             key = min(key, distance)
-    if won and key <= wave.bounds.max_distance:
+    if won and may_go_on(wave, h, length, key):
         push(wave, h, emitted_window(wave, 0.0, length, end, 0.0, sigma, root, 0.0), won, key)
 
 
@@ -160,14 +172,16 @@ def relax(
 
 @inlined
 def note_reached(wave: View, v: int) -> None:
-    """Put a vertex that had no distance among the touched ones."""
+    """Put a vertex that had no distance among the touched ones, and bound the rest of a path."""
     wave.vertices.touched[wave.counters[TOUCHED]] = v
     wave.counters[TOUCHED] += 1
+    if is_pruned(wave):
+        wave.vertices.heuristic[v] = lower_bound_to_target(wave, v)
 
 
 @kernel
 def push_vertex(wave: View, v: int) -> None:
     """Have a vertex wait to emit windows all around. Modifies pool and buckets."""
     distance = wave.vertices.distance[v]
-    if distance <= wave.bounds.max_distance:
+    if distance <= wave.bounds.max_distance and may_pass(wave, v):
         push(wave, -1 - v, emitted_window(wave, 0.0, 0.0, 0.0, 0.0, distance, v, 0.0), 0, distance)

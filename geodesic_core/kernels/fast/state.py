@@ -8,7 +8,7 @@ its half-edge is crossed, and is forgotten then. All distances are lengths of pa
 import numpy as np
 
 from geodesic_core.arrays import aligned_rows
-from geodesic_core.kernels.front.bounds import ABSENT_PRUNING, Bounds
+from geodesic_core.kernels.front.bounds import Bounds
 from geodesic_core.kernels.front.counters import new_counters
 from geodesic_core.kernels.front.state import (
     FACE,
@@ -35,18 +35,25 @@ BUCKETS = 1024
 
 def fast_bounds(bounds: Bounds) -> Bounds:
     """Return the bounds of a fast sweep for the question of another one."""
-    return bounds._replace(merging=(), pruning=ABSENT_PRUNING)
+    return bounds._replace(merging=())
 
 
 def new_wavefront(
-    topology: Topology, sites: Sites, places: int, bucket_width: float, first_target: int
+    topology: Topology,
+    sites: Sites,
+    places: int,
+    bucket_width: float,
+    first_target: int,
+    *,
+    pruned: bool = False,
 ) -> Wavefront:
     """Allocate the state of one sweep: O(V + F K), nothing reached yet.
 
     ``places`` is the number K of places of a half-edge, ``bucket_width`` in mesh units. The sites
     from row ``first_target`` on are reached by the windows that cross their faces.
     """
-    half_edges, nodes = len(topology.links), len(topology.total_angle) + sites.nodes
+    half_edges, vertices = len(topology.links), len(topology.total_angle)
+    nodes = vertices + sites.nodes
     own, first_site = sites.ints.copy(), np.empty(0, np.int32)
     if first_target < len(own):
         first_site = np.full(half_edges // 3, -1, np.int32)
@@ -65,7 +72,9 @@ def new_wavefront(
             buckets_per_unit=1.0 / bucket_width if bucket_width > 0.0 else 1.0,
         ),
         vertices=new_vertices(nodes)._replace(
-            crossing=np.zeros(nodes), touched=np.empty(len(topology.total_angle), np.int32)
+            crossing=np.zeros(nodes),
+            touched=np.empty(vertices, np.int32),
+            heuristic=np.empty(vertices if pruned else 0),
         ),
         merges=NO_MERGES,
         sites=sites._replace(ints=own),

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geodesic_core.arrays import ABSENT, Floats, Singles
+from geodesic_core.arrays import Floats, Singles
 
 LANDMARKS = 16  # of a mesh, at most: a cache line of distances per vertex
 
@@ -62,9 +62,6 @@ _NO_POSITIONS.flags.writeable = False  # as those of meshes: kernels are compile
 
 NO_PRUNING = pruning_toward(_NO_POSITIONS, np.zeros(3), math.inf)
 """The bounds of a sweep that is not pruned."""
-
-ABSENT_PRUNING = PruningBounds(*[ABSENT] * len(PruningBounds._fields))
-"""The bounds of a sweep that is never pruned, whose kernels carry nothing of it."""
 
 
 class Bounds(NamedTuple):
