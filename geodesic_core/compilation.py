@@ -64,6 +64,7 @@ def _paths() -> None:
     # First what precedes the sweep of a search: another process compiles the sweep meanwhile.
     Solver(mesh).shortest_path(0, 8, explain=True)
     Solver(mesh).nearest(0, [3, 8])
+    shortest_path(mesh, 0, 8, method="fast")
 
 
 def _approximate() -> None:

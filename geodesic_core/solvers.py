@@ -31,6 +31,7 @@ from geodesic_core.fields.straight_lines import (
     directions_from,
     lines_from,
 )
+from geodesic_core.fields.straighten import straightened_curve
 from geodesic_core.fields.sweep_result import Retain
 from geodesic_core.fields.sweeps import ExactSweep
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
@@ -38,7 +39,6 @@ from geodesic_core.kernels.jit.cache import sources_digest
 from geodesic_core.loops.handle_loops import handle_loops_of
 from geodesic_core.loops.paths_around import obstacle_of, paths_on_both_sides
 from geodesic_core.loops.shortest_loop import shortest_loop_through
-from geodesic_core.loops.straighten import straightened_curve
 from geodesic_core.matrices.matrix import Layout, find_matrix
 from geodesic_core.mesh.barriers import with_barriers
 from geodesic_core.mesh.canonical import each_of
@@ -329,6 +329,7 @@ def shortest_path(
     waypoints: Points = (),
     max_distance: float | None = None,
     *,
+    method: Literal["exact", "fast"] = "exact",
     barriers: Iterable[int] = (),
     explain: bool = False,
     progress: Callable[[float], None] | None = None,
@@ -336,7 +337,7 @@ def shortest_path(
     deadline_s: float | None = None,
     memory_limit: int | None = None,
 ) -> GeodesicPath:
-    """Return an exact shortest path between two points of the surface (section 5).
+    """Return a shortest path between two points of the surface, exact by default (section 5).
 
     For many paths on one mesh, a `Solver` is faster: its memory is reused, and landmarks narrow
     the search, so that the time of a call does not depend on the size of the mesh.
@@ -350,8 +351,11 @@ def shortest_path(
     waypoints
         Points that the path passes in order; it is shortest from each to the next.
     max_distance
-        Largest length of the path past all waypoints, mesh units; None for no limit. The search
-        ends once it is certain that every path is longer.
+        Largest length of the path past all waypoints, mesh units; None for no limit. The exact
+        search ends once it is certain that every path is longer.
+    method
+        ``"exact"``, or ``"fast"``: a path that is as short as all that lie near it, in about half
+        the time. It is hardly ever not the shortest; its ``error_bound`` estimates by how much.
     barriers
         As in `exact_distance`.
     explain
@@ -389,11 +393,12 @@ def shortest_path(
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     limit = as_limit(max_distance)
+    check_choice("method", method, ("exact", "fast"))
     workspace, control = _workspace_of(mesh, barriers, control)
     stops = _as_stops(workspace.mesh, source, target, waypoints, control)
     with workspace.held(control):
         search = workspace.path_search()
-        path = _shortest_through(search, stops, limit, control, explain=explain)
+        path = _shortest_through(search, stops, limit, control, method=method, explain=explain)
         if isinstance(mesh, Solver) and mesh._workspace is workspace:  # there may be more paths
             search.add_landmark_if_due(stops[0], replace(control, progress=None))
         return path
@@ -1352,10 +1357,12 @@ def _shortest_through(
     limit: float,
     control: Control,
     *,
+    method: Literal["exact", "fast"],
     explain: bool,
 ) -> GeodesicPath:
     """Search for leg after leg, each no longer than the others leave of the limit."""
     legs: list[GeodesicPath] = []
+    find = search.find if method == "exact" else search.find_fast
     positions = np.array([search.mesh.position_for_bounds(stop) for stop in control.watched(stops)])
     left = limit if len(stops) == 2 else limit * (1.0 + AT_LIMIT)  # sums of legs round
     for here, there in pairwise(stops):
@@ -1364,7 +1371,7 @@ def _shortest_through(
             search.add_landmark_if_due(here, replace(control, progress=None))
         rest = length_of(positions[len(legs) + 1 :])
         try:
-            leg = search.find(here, there, leg_control, explain=explain, limit=left - rest)
+            leg = find(here, there, leg_control, explain=explain, limit=left - rest)
         except NoPath:
             raise NoPath(
                 f"the path from {stops[0]} to {stops[-1]} is longer than max_distance = {limit:g}",

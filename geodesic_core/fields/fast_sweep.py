@@ -19,7 +19,7 @@ from geodesic_core.kernels.fast.state import fast_bounds, new_wavefront
 from geodesic_core.kernels.front.bounds import Bounds, exact_bounds
 from geodesic_core.kernels.front.counters import TOUCHED
 from geodesic_core.kernels.front.state import Wavefront, bytes_of, with_larger_pool
-from geodesic_core.kernels.mesh.half_edges import LENGTH
+from geodesic_core.kernels.mesh.half_edges import LENGTH, Topology
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.tolerances import MOST_CROSSINGS
 
@@ -74,14 +74,13 @@ class FastSweep:
         starts = question.start_distances
         sweep.start_sweep(topology, wave, nodes.sources, nodes.source_indices, starts, limits)
         reachable = max(question.reachable, 1)
-        engine = Engine(sweep.advance, _FIRST_BUDGET, self._most_work)
         wave, outcome = run_sweep(
             mesh,
             wave,
             limits,
             control,
             lambda wave: min(float(wave.counters[TOUCHED]) / reachable, 1.0),
-            engine=engine,
+            engine=engine_on(topology),
         )
         if outcome == Outcome.RUNAWAY:
             raise endless()
@@ -98,7 +97,7 @@ class FastSweep:
             question.mesh.topology,
             question.nodes.sites,
             self.effort,
-            self._bucket_width,
+            bucket_width(question.mesh.topology),
             question.nodes.first_target,
         )
 
@@ -109,7 +108,7 @@ class FastSweep:
             rows.advance_rows,
             _FIRST_BUDGET,
             ends_early=False,
-            most_work=self._most_work,
+            most_work=_most_work(self.question.mesh.topology),
         )
 
     def upper_bounds(self, distances: Floats) -> None:
@@ -127,15 +126,20 @@ class FastSweep:
     def _bounds(self) -> Bounds:
         return fast_bounds(self.question.bounds(exact_bounds(self.question.max_distance)))
 
-    @property
-    def _most_work(self) -> int:
-        return MOST_CROSSINGS * len(self.question.mesh.topology.links)
 
-    @property
-    def _bucket_width(self) -> float:
-        """Width of a bucket, mesh units."""
-        lengths = self.question.mesh.topology.geometry[:, LENGTH]
-        return float(lengths[:: max(len(lengths) // _SAMPLES, 1)].mean())
+def engine_on(topology: Topology) -> Engine:
+    """Return what advances a fast sweep."""
+    return Engine(sweep.advance, _FIRST_BUDGET, _most_work(topology))
+
+
+def _most_work(topology: Topology) -> int:
+    return MOST_CROSSINGS * len(topology.links)
+
+
+def bucket_width(topology: Topology) -> float:
+    """Return the width of a bucket, mesh units."""
+    lengths = topology.geometry[:, LENGTH]
+    return float(lengths[:: max(len(lengths) // _SAMPLES, 1)].mean())
 
 
 def estimated(effort: int) -> ErrorBound:

@@ -53,7 +53,9 @@ EXACT = ErrorBound("relative", 0.0, "guaranteed")
 """The bound of exact answers: floating-point rounding aside, there is no error."""
 
 
-StepName = Literal["dijkstra", "shorten", "approximate", "backtrace", "exact", "path"]
+StepName = Literal[
+    "dijkstra", "shorten", "approximate", "fast", "backtrace", "exact", "path", "straighten"
+]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -231,7 +233,7 @@ def rounding_of(mesh: TriangleMesh, distance: float) -> float:
 
 
 def joined(legs: Sequence[GeodesicPath]) -> GeodesicPath:
-    """Return exact paths, each from the end of the one before, as one path."""
+    """Return paths of one method, each from the end of the one before, as one path."""
 
     def chained(arrays: Sequence[Any]) -> Any:  # a leg begins where the one before ends
         return np.concatenate([arrays[0], *(array[1:] for array in arrays[1:])])
@@ -243,6 +245,6 @@ def joined(legs: Sequence[GeodesicPath]) -> GeodesicPath:
         closed=False,
         length=sum(leg.length for leg in legs),
         located=Locations(*map(chained, zip(*(leg.located for leg in legs), strict=True))),
-        error_bound=EXACT,
+        error_bound=legs[0].error_bound,
         steps=tuple(steps) or None,
     )

@@ -13,11 +13,11 @@ from geodesic_core.arrays import Ints, Longs
 from geodesic_core.control import Control, rounds
 from geodesic_core.fields.distance_field import solve
 from geodesic_core.fields.question import Question
+from geodesic_core.fields.straighten import loop_of
 from geodesic_core.fields.sweeps import ExactSweep
 from geodesic_core.kernels.mesh.half_edges import HEAD, NO_FACE, OPPOSITE, TAIL
 from geodesic_core.loops.covers import require_two_sided
 from geodesic_core.loops.cut_graph import half_edges_up, spanning
-from geodesic_core.loops.straighten import loop_of
 from geodesic_core.mesh.surface_curve import SurfaceCurve
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import SHORTER

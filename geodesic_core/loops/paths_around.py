@@ -16,9 +16,9 @@ from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument, NoPath
 from geodesic_core.fields.path import EXACT, GeodesicPath
 from geodesic_core.fields.sources import component_of, disconnected
+from geodesic_core.fields.straighten import portals_along
 from geodesic_core.kernels.mesh.half_edges import BOUNDARY, HEAD, LENGTH, NO_FACE, OPPOSITE, TAIL
 from geodesic_core.loops.covers import Cover, cover_of, require_two_sided
-from geodesic_core.loops.straighten import portals_along
 from geodesic_core.mesh.surface_curve import SurfaceCurve, runs_as_wound
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh

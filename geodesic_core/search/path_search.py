@@ -1,4 +1,4 @@
-"""The exact path between two points: a sequence of searches with tightening bounds (section 5).
+"""The path between two points: a sequence of searches with tightening bounds (section 5).
 
 1. Along edges from the target to the start, directed by lower bounds; what it finds is shortened
    across faces: an upper bound U.
@@ -9,36 +9,35 @@
 
 A limit of the length takes the place of U as soon as it is below: a target that is not reached then
 is farther.
+
+A fast path is found by step 1 and a fast sweep from the start, pruned by U. Both are pulled tight,
+and the shorter is the answer.
 """
 
 import math
-import time
 from contextlib import suppress
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
-from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.errors import (
     Cancelled,
     DeadlineExceeded,
     InternalError,
     MemoryLimitExceeded,
-    NoPath,
 )
 from geodesic_core.fields.path import (
     EXACT,
+    ErrorBound,
     GeodesicPath,
-    SearchStep,
-    StepName,
     located_path,
     rounding_of,
     traced_path,
 )
 from geodesic_core.fields.question import Question
 from geodesic_core.fields.sources import Nodes, corners_of, nodes_of
+from geodesic_core.fields.straighten import straightened_curve
 from geodesic_core.fields.sweep import sweep_nodes, winners_of
 from geodesic_core.fields.sweeps import ExactSweep
 from geodesic_core.kernels.front import pruning, state
@@ -49,7 +48,7 @@ from geodesic_core.kernels.front.bounds import (
     exact_bounds,
     merging_bounds,
 )
-from geodesic_core.kernels.front.counters import CREATED, TOUCHED
+from geodesic_core.kernels.front.counters import TOUCHED
 from geodesic_core.kernels.front.state import (
     NO_SITES,
     PREDECESSOR,
@@ -62,9 +61,11 @@ from geodesic_core.kernels.mesh.half_edges import LENGTH
 from geodesic_core.kernels.paths import edge_dijkstra, funnel
 from geodesic_core.mesh.curve import length_in_face
 from geodesic_core.mesh.surface_curve import length_on
-from geodesic_core.mesh.surface_point import SurfacePoint
+from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.search.fast_path_sweep import FastPathSweep
 from geodesic_core.search.landmarks import Landmarks
+from geodesic_core.search.leg import End, Leg, SearchLog
 from geodesic_core.tolerances import AT_LIMIT, SEARCH_SLACK, STRAIGHT
 
 GUIDE_ERROR = 1e-3
@@ -76,6 +77,10 @@ _MARGIN = 2.0
 # The share of a search that is done, about, before steps 2 and 4
 _AFTER_EDGES = 0.2
 _AFTER_APPROXIMATE = 0.9
+
+FAST_PATH = ErrorBound("relative", 0.001, "estimated")
+"""The error of fast paths: of 100 that were measured on each mesh, 99 are within; see
+docs/accuracy.md."""
 
 
 class PathSearch:
@@ -93,6 +98,7 @@ class PathSearch:
         self._outward = new_wavefront(topology, room, pruned=True)
         self._landmarks = Landmarks(mesh)
         self._nearest = np.zeros(len(mesh.vertices) + room.nodes, np.int32)
+        self._fast = FastPathSweep(mesh, self._nearest)
         self._state_bytes = state.bytes_of(self._toward) + state.bytes_of(self._outward)
         self._margin = _MARGIN * float(topology.geometry[:, LENGTH].mean())
         self._touched = 0
@@ -100,7 +106,8 @@ class PathSearch:
     @property
     def nbytes(self) -> int:
         """Memory held, bytes, the mesh not counted."""
-        return self._landmarks.distances.nbytes + self._nearest.nbytes + self._state_bytes
+        held = self._landmarks.distances.nbytes + self._nearest.nbytes + self._state_bytes
+        return held + self._fast.nbytes
 
     def find(
         self,
@@ -125,21 +132,69 @@ class PathSearch:
         """
         control.check_memory(self.nbytes)
         control.checkpoint(0.0)
-        ends = _End(self.mesh, source), _End(self.mesh, target)
-        leg = _Leg(*ends, limit, SEARCH_SLACK, control, _Log(self, explain))
+        ends = End(self.mesh, source), End(self.mesh, target)
+        leg = Leg(*ends, limit, SEARCH_SLACK, control, SearchLog(self.mesh, explain))
         try:
             path = self._search(leg)
         except InternalError:
             # Rounding on slivers can exceed any slack; without bounds there is nothing to lose.
             # Where many faces lie near each other, the path of the merging sweep may be lost.
-            leg = _Leg(*ends, limit, math.inf, control, _Log(self, explain))
+            leg = Leg(*ends, limit, math.inf, control, SearchLog(self.mesh, explain))
             path = self._search(leg)
         is_rounding = limit * (1.0 - AT_LIMIT) < path.length
         if is_rounding and target.vertex_index is not None and not self._is_within(leg):
             raise leg.beyond()
         return path
 
-    def _is_within(self, leg: "_Leg") -> bool:
+    def find_fast(
+        self,
+        source: SurfacePoint,
+        target: SurfacePoint,
+        control: Control,
+        *,
+        explain: bool,
+        limit: float = math.inf,
+    ) -> GeodesicPath:
+        """Return a path between two canonical points of one component, almost always the shortest.
+
+        It is as short as any that lies near it, and `FAST_PATH` estimates its excess.
+
+        Raises
+        ------
+        NoPath
+            The one that was found is longer than ``limit``.
+        Cancelled, DeadlineExceeded, MemoryLimitExceeded
+            As in `run_sweep`.
+        """
+        control.check_memory(self.nbytes)
+        control.checkpoint(0.0)
+        ends, log = (End(self.mesh, source), End(self.mesh, target)), SearchLog(self.mesh, explain)
+        leg = Leg(*ends, limit, SEARCH_SLACK, control, log)
+        if leg.straight > leg.longest:
+            raise leg.beyond()
+        try:
+            upper, stops = self._search_edges(leg)
+            end = leg.end
+            toward = self._landmarks.pruning_through(
+                end.position, end.corners, end.reaches, math.inf
+            )
+            others = control.holding(self.nbytes - self._fast.nbytes)
+            before = self._fast.touched
+            swept = self._fast.curve(leg, upper, toward, others, _AFTER_EDGES)
+            self._touched += self._fast.touched - before
+        finally:
+            self._forget()
+        quiet = replace(control.holding(self.nbytes), progress=None)
+        curves = [straightened_curve(swept, quiet)] if swept is not None else []
+        if not curves or curves[0].length > upper:
+            curves.append(straightened_curve(self.mesh.curve(stops), quiet))
+        best = min(curves, key=lambda curve: curve.length)
+        log.add("straighten", best.length)
+        if best.length > leg.longest:
+            raise leg.beyond()
+        return GeodesicPath(**vars(best), error_bound=FAST_PATH, steps=log.steps)
+
+    def _is_within(self, leg: Leg) -> bool:
         """Tell whether a vertex is within the limit for fields, whose sums round differently."""
         control = replace(leg.control.holding(self.nbytes), progress=None)
         ends = leg.start.point, leg.end.point
@@ -147,11 +202,11 @@ class PathSearch:
         distance = ExactSweep(question).run(control).vertices.distance
         return math.isfinite(distance[question.nodes.targets[0]])
 
-    def _search(self, leg: "_Leg") -> GeodesicPath:
+    def _search(self, leg: Leg) -> GeodesicPath:
         if leg.straight > leg.longest:
             raise leg.beyond()
         try:
-            upper = self._search_edges(leg)
+            upper, _ = self._search_edges(leg)
             start = leg.start
             pruning_bounds = self._landmarks.pruning_through(
                 start.position, start.corners, start.reaches, math.inf
@@ -178,10 +233,11 @@ class PathSearch:
                 corners, _ = corners_of(self.mesh, beside)
                 self._landmarks.add(int(corners[0]), control.holding(self.nbytes))
 
-    def _search_edges(self, leg: "_Leg") -> float:
-        """Return the length of a path along edges, shortened across faces (step 1).
+    def _search_edges(self, leg: Leg) -> tuple[float, list[Point]]:
+        """Return the length of a path along edges, shortened across faces (step 1), and its stops.
 
-        At an end that is no vertex it begins or ends at the nearest corner.
+        At an end that is no vertex it begins or ends at the nearest corner. In one face it is
+        straight, where that is shorter.
         """
         topology, wave = self.mesh.topology, self._outward
         first, last = leg.start.nearest_corner, leg.end.nearest_corner
@@ -204,13 +260,18 @@ class PathSearch:
             # Unfolding rounds: by more than the slack of the searches, where faces are slivers.
             upper = min(upper, funnel.shortened(topology, path) * (1.0 + STRAIGHT))
         upper += beside
-        if leg.start.point.face_index == leg.end.point.face_index:
-            upper = min(upper, length_in_face(self.mesh, leg.start.point, leg.end.point))
+        ends = leg.start.point, leg.end.point
+        vertices = topology.outer_vertex[path].tolist()
+        stops = [ends[0], *vertices, ends[1]]
+        if ends[0].face_index == ends[1].face_index:
+            straight = length_in_face(self.mesh, *ends)
+            if straight < upper:
+                upper, stops = straight, [*ends]
         leg.log.add("shorten", upper)
-        return upper
+        return upper, stops
 
     def _sweep_toward(
-        self, leg: "_Leg", upper: float, pruning_bounds: PruningBounds
+        self, leg: Leg, upper: float, pruning_bounds: PruningBounds
     ) -> tuple[float, PruningBounds]:
         """Return a tighter upper bound, and the bounds of the next sweep (steps 2 and 3)."""
         limit = leg.loosened(leg.bound(upper)) + self._margin
@@ -233,9 +294,7 @@ class PathSearch:
             limit=tighter, known=wave.vertices.distance, ceiling=limit
         )
 
-    def _sweep_outward(
-        self, leg: "_Leg", upper: float, pruning_bounds: PruningBounds
-    ) -> GeodesicPath:
+    def _sweep_outward(self, leg: Leg, upper: float, pruning_bounds: PruningBounds) -> GeodesicPath:
         """Return the path (steps 4 and 5)."""
         bounds = exact_bounds(math.inf, pruning_bounds)
         nodes = nodes_of(self.mesh, [(leg.start.point,)], [leg.end.point], leg.control)
@@ -267,95 +326,3 @@ class PathSearch:
     def _forget(self) -> None:
         pruning.forget(self.mesh.topology, self._toward)
         pruning.forget(self.mesh.topology, self._outward)
-
-
-class _End:
-    """An end of a search, and the vertices around it."""
-
-    def __init__(self, mesh: TriangleMesh, point: SurfacePoint) -> None:
-        self.point = point
-        self.position: Floats = mesh.position_for_bounds(point)
-        self.corners, self.reaches = corners_of(mesh, point)
-
-    @property
-    def nearest_corner(self) -> int:
-        """The inner vertex nearest to it."""
-        return int(self.corners[self.reaches.argmin()])
-
-
-class _Leg(NamedTuple):
-    """Ends, limits and control of a search."""
-
-    start: _End
-    end: _End
-    limit: float
-    """Length of the longest path that is asked for, mesh units"""
-    slack: float
-    """Relative amount by which it looks beyond its bounds; infinite where it is not to have any"""
-    control: Control
-    log: "_Log"
-
-    @property
-    def longest(self) -> float:
-        """Length above which a path is beyond the limit however it is rounded."""
-        return self.limit * (1.0 + AT_LIMIT)
-
-    @property
-    def straight(self) -> float:
-        """Lower bound of the distance of its ends: as the crow flies, where that is one."""
-        return float(np.linalg.norm(self.start.position - self.end.position))
-
-    def bound(self, upper: float) -> float:
-        """Return how far to look where a path of length ``upper`` is known.
-
-        Beyond the limit by more than slivers round: a path that is missed is longer than the limit.
-        """
-        return min(upper, self.limit * (1.0 + STRAIGHT))
-
-    def loosened(self, length: float) -> float:
-        """Return a length with the slack: where that is infinite, even if the length is 0.
-
-        Ends in one place may have a path of length 0, and a distance that is rounded.
-        """
-        return length * (1.0 + self.slack) if self.slack < math.inf else math.inf
-
-    def missed(self, how: str, upper: float) -> NoPath | InternalError:
-        """Return the error of not having reached the end, though a path so long leads there."""
-        return self.lost(how) if self.bound(upper) == upper else self.beyond()
-
-    def beyond(self) -> NoPath:
-        """Return the error of a path that is longer than the limit."""
-        return NoPath(
-            f"{self.end.point} is farther than {self.limit:g} from {self.start.point}",
-            "beyond_max_distance",
-        )
-
-    def lost(self, how: str) -> InternalError:
-        """Return the error of not having reached the end."""
-        return InternalError(
-            f"{self.end.point} was not reached {how} from {self.start.point}, though the two are "
-            f"connected; please report this mesh"
-        )
-
-
-class _Log:
-    """Log of the steps of a search, where they are to be explained."""
-
-    def __init__(self, search: PathSearch, explain: bool) -> None:
-        self.steps: tuple[SearchStep, ...] | None = () if explain else None
-        self._mesh = search.mesh
-        self._began = time.perf_counter()
-
-    def add(self, name: StepName, bound: float, wave: Wavefront | None = None) -> None:
-        if self.steps is None:
-            return
-        seconds = time.perf_counter() - self._began
-        faces: Ints = np.empty(0, np.int32)
-        if wave is not None:
-            visited = np.zeros(len(self._mesh.faces), np.uint8)
-            touched = wave.vertices.touched[: wave.counters[TOUCHED]]
-            pruning.mark_visited(self._mesh.topology, wave.vertices.distance, touched, visited)
-            faces = np.flatnonzero(visited).astype(np.int32)
-        windows = 0 if wave is None else int(wave.counters[CREATED])
-        self.steps += (SearchStep(0, name, seconds, bound, windows, faces),)
-        self._began = time.perf_counter()

@@ -254,6 +254,7 @@ def _with_an_error() -> Iterator[tuple[str, Way]]:
         yield f"fast {effort}", Way(ask, 0.0, UNKNOWN, most=FEW)
         ask = partial(traced, solve=solve, told=True)
         yield f"fast {effort}, paths", Way(ask, 0.0, UNKNOWN, most=FEWER)
+    yield "fast search", Way(partial(searched, method="fast"), 0.0, UNKNOWN, most=FEWER)
 
 
 WAYS = {**dict(_exact()), **dict(_with_an_error())}

@@ -50,6 +50,7 @@ QUESTIONS: dict[str, Callable[[], object]] = {
     "windows": lambda: gc.exact_distance(MESH, 0, retain="windows").distance_at(POINT),
     "gradient": lambda: gc.exact_distance(MESH, 0).gradient,
     "two points": lambda: gc.shortest_path(MESH, POINT, LAST, explain=True),
+    "fast two points": lambda: gc.shortest_path(MESH, POINT, LAST, method="fast"),
     "waypoints": lambda: gc.Solver(MESH).shortest_path(0, LAST, [ON_EDGE]),
     "approximate": lambda: gc.approximate_distance(MESH, 0),
     "approximate path": lambda: gc.approximate_distance(MESH, POINT).path_to(LAST),

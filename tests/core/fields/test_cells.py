@@ -75,6 +75,7 @@ def test_each_face_belongs_to_the_source_that_is_nearest(sample, limit):
     check_cells(mesh, field, field.cells())
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize(("low", "high"), [(0.0, 0.3), (0.7, 1.0), (0.4, 0.6)])
 @pytest.mark.parametrize("sources", [[0, -1, 3], [0, 3]])
 def test_barriers_belong_to_no_cell(low, high, sources):

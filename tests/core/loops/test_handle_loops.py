@@ -55,6 +55,7 @@ def test_holes_are_no_handles(name):
     assert gc.handle_loops(getattr(gc.samples, name)(2000)) == []
 
 
+@pytest.mark.jit
 def test_holes_in_a_torus_change_no_handle():
     mesh = gc.TriangleMesh(*zoo.torus(30, 20))
     x, y, _ = mesh.vertices[mesh.faces].mean(axis=1).T

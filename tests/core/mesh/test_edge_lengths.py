@@ -87,6 +87,7 @@ def test_on_a_flat_torus_all_is_as_in_the_plane_modulo_its_sides(columns, rows):
             ) == pytest.approx(0.0, abs=1e-11)
 
 
+@pytest.mark.jit
 def test_lines_of_equal_distance_and_borders_are_locations():
     """On a flat torus: circles, and the two lines halfway between two sources."""
     mesh = flat_torus(20, 20, 1.0, 1.0)

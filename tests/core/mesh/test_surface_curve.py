@@ -200,6 +200,7 @@ def test_the_rim_of_barriers_is_a_boundary() -> None:
     assert sorted(point.vertex_index for point in rim.locations) == sorted(mesh.faces[3].tolist())
 
 
+@pytest.mark.jit
 def test_a_curve_through_points_is_that_of_their_curve():
     mesh = gc.samples.knot(2000)
     loop = gc.shortest_loop(mesh, 7)

@@ -79,6 +79,7 @@ def test_no_two_are_nearer_than_the_covering_radius():
     assert found.distances.max() == found.radius[-1]
 
 
+@pytest.mark.jit
 def test_a_radius_ends_it_as_soon_as_it_is_reached():
     mesh = gc.samples.sphere(1300)
     found = gc.farthest_points(mesh, radius=0.5)

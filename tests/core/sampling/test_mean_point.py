@@ -90,6 +90,7 @@ def test_it_is_no_worse_than_any_vertex(case):
     assert mean.variance <= fields.mean(axis=0).min() * (1.0 + 1e-12)
 
 
+@pytest.mark.jit
 def test_the_mean_of_one_point_is_itself():
     mesh = gc.samples.knot(800)
     for point in random_points(mesh, 3):
