@@ -43,6 +43,7 @@ BENCHMARKS: dict[str, Callable[[Inputs, int], Section | Iterable[Section]]] = {
     "fast": fast.run,
     "path": path.run,
     "path-peers": path.run_peers,
+    "fast-path": path.run_fast,
     "landmarks": path.run_landmarks,
     "maps": maps.run,
     "samples": sampling.run,

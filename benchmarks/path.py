@@ -67,6 +67,16 @@ FLIPS = 1.0
 FEWER = 2.0
 """Times fewer faces that step 2 visits with landmarks, at least."""
 
+FAST_MESHES = (
+    "bunny.obj, Loop",
+    "fandisk.obj, Loop, Loop",
+    "horse97k.ply",
+    "buddha30k.ply",
+    "teapot.obj",
+)
+FAST_MS, MEAN_EXCESS, LARGEST_EXCESS = 25.0, 0.05, 1.0
+"""Of fast paths: milliseconds of 90 % of them, and per cent by which they are too long."""
+
 Pair = tuple[int, int]
 
 
@@ -170,6 +180,20 @@ def run_peers(inputs: Inputs, runs: int) -> Section:
     )
 
 
+def run_fast(inputs: Inputs, runs: int) -> Section:
+    """Compare fast paths with exact ones, by turns, by one solver with its landmarks."""
+    gc.warm_up()
+    rows = [_row_of_fast(*mesh, runs) for mesh in inputs.arrays(FAST_MESHES)]
+    return Section(
+        "Fast paths",
+        f'`shortest_path(method="fast")` beside the exact search: {5 * PAIRS * runs} random far '
+        f"pairs, one thread, by turns, by a solver with its {LANDMARKS} landmarks. Milliseconds: "
+        f"the median, and 90 % take no longer. Excess of the length over the exact one, per cent.",
+        ["mesh", "faces", "exact", "90 %", "fast", "90 %", "mean excess", "largest"],
+        rows,
+    )
+
+
 def run_landmarks(inputs: Inputs, runs: int) -> Section:
     """Compare far paths, and the region of step 2, without and with landmarks."""
     gc.warm_up()
@@ -255,6 +279,30 @@ def _row_of_peers(name: str, vertices: Floats, faces: Ints, runs: int) -> list[s
             f"{100 * max(longer[i]):.2f}",
         ]
     return row if len(peers) == 2 else [*row, "", "", ""]
+
+
+def _row_of_fast(name: str, vertices: Floats, faces: Ints, runs: int) -> list[str]:
+    mesh = gc.TriangleMesh(vertices, faces)
+    far = _pairs(mesh, np.random.default_rng(SEED), *FAR)
+    solver = gc.Solver(mesh)
+    _add_landmarks(solver, far)
+    exact_ms, fast_ms, excess = [], [], []
+    for pair in islice(far, 5 * PAIRS * runs):
+        exact_s, exact = timed(partial(solver.shortest_path, *pair))
+        fast_s, fast = timed(partial(solver.shortest_path, *pair, method="fast"))
+        exact_ms.append(1e3 * exact_s)
+        fast_ms.append(1e3 * fast_s)
+        excess.append(100.0 * (fast.length / exact.length - 1.0))
+    return [
+        name,
+        f"{len(faces):,}",
+        f"{median(exact_ms):.1f}",
+        f"{np.quantile(exact_ms, 0.9):.1f}",
+        f"{median(fast_ms):.1f}",
+        rated(float(np.quantile(fast_ms, 0.9)), FAST_MS, at_least=False, digits=1),
+        rated(float(np.mean(excess)), MEAN_EXCESS, at_least=False, digits=4),
+        rated(max(excess), LARGEST_EXCESS, at_least=False, digits=3),
+    ]
 
 
 def _row_of_landmarks(name: str, vertices: Floats, faces: Ints, runs: int) -> list[str]:

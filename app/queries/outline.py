@@ -40,13 +40,13 @@ def locations_of(curve: gc.SurfaceCurve) -> list[dict[str, Any]]:
     ]
 
 
-def no_outline(reason: str, field: gc.DistanceField | None = None) -> dict[str, Any]:
-    """Return the members that stand for a path that does not exist, or that a field has not found.
+def no_outline(reason: str, error_bound: gc.ErrorBound) -> dict[str, Any]:
+    """Return the members that stand for a path that does not exist, or that was not found.
 
-    That it is longer than the limit is certain, but for fields whose error is estimated.
+    That it is longer than the limit is certain, unless the error of distances is estimated.
     """
     bound = CERTAIN
-    if field is not None and field.error_bound.kind == "estimated" and reason != "disconnected":
-        bound = bound_of(field.error_bound)
+    if error_bound.kind == "estimated" and reason != "disconnected":
+        bound = bound_of(error_bound)
     nothing = dict.fromkeys(("length", "points", "locations", "faces"))
     return {"status": "no_path", "reason": reason, **nothing, "error_bound": bound}

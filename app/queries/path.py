@@ -10,7 +10,7 @@ import geodesic_core as gc
 from app.encoding import CSV, JSON, NPY, OBJ, OCTETS, Answer
 from app.errors import Fault, ProblemError, pointer
 from app.queries import point_text
-from app.queries.accuracy import solve_field, with_default_accuracy
+from app.queries.accuracy import options_of, solve_field, with_default_accuracy
 from app.queries.base import VALUES_OF_POINT, ExecutionContext, Query
 from app.queries.cost_model import search_seconds, share_reached, sweep_seconds
 from app.queries.outline import SHOWN, no_outline, outline_of
@@ -24,7 +24,7 @@ from app.queries.validation import (
 )
 from app.queries.views import line_of
 from app.schemas.points import Point
-from app.schemas.requests import PathParameters, PathRequest
+from app.schemas.requests import EFFORT_OF_PATHS, PathParameters, PathRequest
 from app.settings import Settings
 from app.store.meshes import OpenMesh
 
@@ -38,9 +38,11 @@ class PathQuery(Query[PathRequest]):
 
     @classmethod
     def normalized(cls, request: PathRequest) -> PathRequest:
-        """Name error or effort; refuse waypoints where the path is not exact."""
-        if request.method != "exact" and request.waypoints:
-            raise invalid_fields(["/waypoints"], "goes with method 'exact' only")
+        """Name error or effort; refuse waypoints where the path is approximate."""
+        if request.method == "approximate" and request.waypoints:
+            raise invalid_fields(["/waypoints"], "goes with methods 'exact' and 'fast' only")
+        if request.method == "fast" and request.effort is None:
+            request = request.model_copy(update={"effort": EFFORT_OF_PATHS})
         return with_default_accuracy(request)
 
     def check_limits(self, settings: Settings) -> None:
@@ -55,22 +57,17 @@ class PathQuery(Query[PathRequest]):
     def rough_seconds(self) -> float:
         """Return the cost of a search for each leg, or of a sweep."""
         request = self.request
-        if request.method != "exact":
+        if request.method == "approximate":
             share = share_reached(self.size, 1, request.max_distance)
             return sweep_seconds(self.size.faces, request, share)
         return search_seconds(self.size.faces, 1 + len(request.waypoints))
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
-        """Search for an exact path, or sweep for another one."""
+        """Search for an exact or a fast path, or sweep for an approximate one."""
         request = self.request
         source, target, *waypoints = points
-        field: gc.DistanceField | None = None
         try:
-            if request.method == "exact":
-                path = opened.solver.shortest_path(
-                    source, target, waypoints, request.max_distance, **context.options
-                )
-            else:
+            if request.method == "approximate":
                 start = [gc.Source(source)]
                 field = solve_field(
                     opened,
@@ -81,8 +78,18 @@ class PathQuery(Query[PathRequest]):
                     targets=[target],
                 )
                 path = field.path_to(target, **context.options)
+            else:
+                path = opened.solver.shortest_path(
+                    source,
+                    target,
+                    waypoints,
+                    request.max_distance,
+                    **options_of(request),
+                    **context.options,
+                )
         except gc.errors.NoPath as error:
-            return self._answer(opened, points, no_outline(error.reason, field))
+            bound = gc.error_bound(opened.mesh, **options_of(request))
+            return self._answer(opened, points, no_outline(error.reason, bound))
         answer = self._answer(opened, points, outline_of(path))
         values = VALUES_OF_POINT * len(path.locations)
         return replace(answer, values=values, array=lambda: path.points)

@@ -90,7 +90,7 @@ class PathsQuery(Query[PathsRequest]):
             try:
                 path = field.path_to(target)
             except gc.errors.NoPath as error:
-                found.append(no_outline(error.reason, field))
+                found.append(no_outline(error.reason, field.error_bound))
                 continue
             values += VALUES_OF_POINT * len(path.locations)
             check_json_size(values, context.max_values, self.hint)

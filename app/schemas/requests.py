@@ -379,8 +379,18 @@ class Stops(AmongBarriers):
     )
 
 
+EFFORT_OF_PATHS = 1
+"""Their sweep only chooses between ways, which are pulled tight afterwards"""
+
+
 class PathRequest(AccuracyOrEffort, Stops):
     """The shortest path from ``source`` to ``target``, past ``waypoints`` in their order."""
+
+    effort: Effort | None = Field(
+        default=None,
+        description="For `fast`: more effort takes more time, and seldom gives a shorter path; "
+        f"{EFFORT_OF_PATHS} by default",
+    )
 
 
 class StepsRequest(Stops):
@@ -561,6 +571,7 @@ class PathParameters(StrictModel):
     )
     method: Method = Field(
         default="exact",
-        description="`approximate` within an error of 0.001, `fast` with an effort of 2",
+        description="`approximate` within an error of 0.001, `fast` with an effort of "
+        f"{EFFORT_OF_PATHS}",
     )
     format: AnswerFormat | None = _FORMAT

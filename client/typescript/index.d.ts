@@ -2639,7 +2639,7 @@ export interface components {
             absolute_error?: number | null;
             /**
              * Effort
-             * @description For `fast`: more effort takes more time and lowers the error; 2 by default
+             * @description For `fast`: more effort takes more time, and seldom gives a shorter path; 1 by default
              */
             effort?: (1 | 2 | 4 | 8) | null;
         };
@@ -3575,7 +3575,7 @@ export interface operations {
                 to: string;
                 /** @description A waypoint, in the same spellings; repeat it for several, in order */
                 via?: string[];
-                /** @description `approximate` within an error of 0.001, `fast` with an effort of 2 */
+                /** @description `approximate` within an error of 0.001, `fast` with an effort of 1 */
                 method?: "exact" | "approximate" | "fast";
                 /** @description Overrides `Accept` */
                 format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv";

@@ -38,7 +38,7 @@ def sweep_of(
     """
     check_choice("method", method, get_args(Method))
     if method == "fast":
-        return partial(FastSweep, effort=_as_effort(effort))
+        return partial(FastSweep, effort=as_effort(effort))
     if method == "approximate":
         relative, absolute = _as_errors(relative_error, absolute_error)
         if not mesh.is_rough:  # rounding there exceeds what merging is allowed
@@ -62,7 +62,7 @@ def promise_of(
     """
     check_choice("method", method, get_args(Method))
     if method == "fast":
-        return estimated(_as_effort(effort))
+        return estimated(as_effort(effort))
     if method == "exact":
         return EXACT
     errors = _as_errors(relative_error, absolute_error)
@@ -86,7 +86,8 @@ def _as_errors(relative: float | None, absolute: float | None) -> tuple[float, f
     )
 
 
-def _as_effort(effort: Effort) -> int:
+def as_effort(effort: Effort) -> int:
+    """Return an effort, or raise InvalidArgument."""
     if not is_index(effort) or effort not in get_args(Effort):
         raise InvalidArgument(f"effort is {effort!r}; it must be 1, 2, 4 or 8")
     return int(effort)

@@ -25,9 +25,6 @@ from geodesic_core.mesh.surface_curve import SurfaceCurve, in_space, length_on, 
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.leg import End, Leg
 
-_EFFORT = 1
-"""More takes longer, and what it finds is hardly ever shorter once it is pulled tight."""
-
 _BEYOND = 1.002, 1.03
 """Shares of the length of the known path up to which it looks, one after the other.
 
@@ -54,33 +51,49 @@ class FastPathSweep:
         return 0 if self._wave is None else bytes_of(self._wave)
 
     def curve(
-        self, leg: Leg, upper: float, pruning_bounds: PruningBounds, control: Control, share: float
+        self,
+        leg: Leg,
+        upper: float,
+        pruning_bounds: PruningBounds,
+        effort: int,
+        control: Control,
+        share: float,
     ) -> SurfaceCurve | None:
         """Return a path from the start to the end, or None where it finds none of that length.
 
         ``pruning_bounds`` are those of paths through the end, ``share`` is the progress to show.
+        Another ``effort`` than that of the call before takes new memory.
 
         Raises
         ------
         Cancelled, DeadlineExceeded, MemoryLimitExceeded
             As in `run_sweep`.
         """
+        if self._wave is not None and self._wave.places.per_edge != effort:
+            self._wave = None
         for beyond in _BEYOND:
             limit = leg.bound(upper) * beyond
-            curve = self._within(leg, upper, pruning_bounds._replace(limit=limit), control, share)
+            bounds = pruning_bounds._replace(limit=limit)
+            curve = self._within(leg, upper, bounds, effort, control, share)
             if curve is not None:
                 return curve
         return None
 
     def _within(
-        self, leg: Leg, upper: float, pruning_bounds: PruningBounds, control: Control, share: float
+        self,
+        leg: Leg,
+        upper: float,
+        pruning_bounds: PruningBounds,
+        effort: int,
+        control: Control,
+        share: float,
     ) -> SurfaceCurve | None:
         """Return a path that is not much longer than the limit of the bounds."""
         mesh, topology = self.mesh, self.mesh.topology
         wave, self._wave = self._wave, None
         if wave is None:
             width = bucket_width(topology)
-            wave = new_wavefront(topology, NO_SITES, _EFFORT, width, 0, pruned=True)
+            wave = new_wavefront(topology, NO_SITES, effort, width, 0, pruned=True)
             control.check_memory(bytes_of(wave))
         bounds = fast_bounds(exact_bounds(math.inf, pruning_bounds))
         corners = topology.outer_vertex[leg.start.corners]

@@ -10,6 +10,7 @@ import {
   locate,
   pointOf,
 } from "../src/api/queries";
+import type { Outline } from "../src/api/types";
 import { questionOf } from "../src/ask/fields";
 import { isolinesOf } from "../src/ask/isolines";
 import { INITIAL, type State } from "../src/state/state";
@@ -137,12 +138,32 @@ describe("paths", () => {
     barriers: [7],
   };
 
-  test("of one source are asked for directly", async () => {
-    const requests = fakeService({ "POST /v1/meshes/m/path": () => json({ length: 1 }) });
-    const { sources, ...rest } = route;
-    await askRoute("m", { ...route, sources: sources.slice(0, 1) }, signal);
+  async function outlinesOf(question: RouteQuestion, isOld = () => false): Promise<Outline[]> {
+    const outlines = [];
+    for await (const outline of askRoute("m", question, signal, isOld)) outlines.push(outline);
+    return outlines;
+  }
 
-    expect(requests.map(({ body }) => body)).toEqual([{ source: { vertex: 4 }, ...rest }]);
+  test("of one source are asked for directly, fast ones first", async () => {
+    const lengths = [3, 1];
+    const requests = fakeService({
+      "POST /v1/meshes/m/path": () => json({ length: lengths.shift() }),
+    });
+    const { sources, ...rest } = route;
+    const question = { sources: sources.slice(0, 1), ...rest };
+    expect(await outlinesOf(question)).toEqual([{ length: 3 }, { length: 1 }]);
+
+    expect(requests.map(({ body }) => body)).toEqual([
+      { source: { vertex: 4 }, method: "fast", ...rest },
+      { source: { vertex: 4 }, method: "exact", ...rest },
+    ]);
+  });
+
+  test("that nobody waits for any more are not asked for exactly", async () => {
+    fakeService({ "POST /v1/meshes/m/path": () => json({ length: 3 }) });
+    const question = { ...route, sources: route.sources.slice(0, 1) };
+
+    expect(await outlinesOf(question, () => true)).toEqual([{ length: 3 }]);
   });
 
   test.each([
@@ -154,11 +175,12 @@ describe("paths", () => {
       "POST /v1/meshes/m/path": () => json({ length: 2 }),
     });
     const { sources, ...rest } = { ...route, waypoints };
-    expect(await askRoute("m", { sources, ...rest }, signal)).toEqual({ length: 2 });
+    const [outline] = await outlinesOf({ sources, ...rest }, () => true);
+    expect(outline).toEqual({ length: 2 });
 
     expect(requests.map(({ body }) => body)).toEqual([
       { sources, targets: [first], barriers: [7], include: ["nearest_source"] },
-      { source: { vertex: 5 }, ...rest },
+      { source: { vertex: 5 }, method: "fast", ...rest },
     ]);
   });
 
@@ -176,7 +198,7 @@ describe("paths", () => {
       "POST /v1/meshes/m/distances": () => json({ nearest_source: [null] }),
       "POST /v1/meshes/m/path": () => json({ length: null, reason: "disconnected" }),
     });
-    await askRoute("m", route, signal);
+    await outlinesOf(route);
 
     expect(requests[1]?.body).toMatchObject({ source: { vertex: 4 } });
   });

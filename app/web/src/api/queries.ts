@@ -163,16 +163,24 @@ export interface RouteQuestion {
   barriers: number[];
 }
 
-/** Return the shortest path; of several sources, it starts at the nearest. */
-export async function askRoute(
+/**
+ * Yield a fast path, then the shortest, unless there is a newer question by then; of several
+ * sources, both start at the nearest.
+ */
+export async function* askRoute(
   mesh: string,
   question: RouteQuestion,
   signal: AbortSignal,
-): Promise<Outline> {
+  isOld: () => boolean,
+): AsyncGenerator<Outline> {
   const { sources, ...rest } = question;
   const source = sources[await nearestSource(mesh, question, signal)];
-  const response = await post(`v1/meshes/${mesh}/path`, { source, ...rest }, {}, signal);
-  return response.json() as Promise<Outline>;
+  for (const method of ["fast", "exact"] as const) {
+    if (method === "exact" && isOld()) return;
+    const body = { source, method, ...rest };
+    const response = await post(`v1/meshes/${mesh}/path`, body, {}, signal);
+    yield (await response.json()) as Outline;
+  }
 }
 
 /** Return the steps of the search for the shortest path. */

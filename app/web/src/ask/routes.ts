@@ -1,4 +1,5 @@
-// The shortest path to the target, which follows the pointer, and the steps of its search.
+// The path to the target, which follows the pointer: fast at first, and the shortest once the
+// pointer rests. And the steps of its search.
 import { LatestOnly } from "../api/latestOnly";
 import { askRoute, askSteps, pointOf, type RouteQuestion } from "../api/queries";
 import type { Outline, Point, Step } from "../api/types";
@@ -98,7 +99,10 @@ export class Routes {
   private async answer(request: RouteRequest, signal: AbortSignal): Promise<void> {
     const { mesh, ...question } = request;
     try {
-      this.show(await askRoute(mesh, question, signal), request);
+      const isOld = () => request !== this.request;
+      for await (const outline of askRoute(mesh, question, signal, isOld)) {
+        this.show(outline, request);
+      }
     } catch (failure) {
       // After a failure or an abort, the same request may be made again.
       if (request === this.request) this.requested = "";
