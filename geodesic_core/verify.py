@@ -13,7 +13,9 @@ at least f(q) - f(p) - |pq| for all p and q on its rim, and f(q) - c - |sq| for 
 that starts at c. A path from a source to a vertex v crosses faces. Each crossing raises f by its
 length and tau at most. Where it crosses a face more than once, the straight way from the first
 point in the face to the last is no longer. So the path is at least f(v) less the sum of tau over
-all faces long.
+all faces long. And it is at least t <= f(v) less the sum over some faces long, all those with a
+source inside among them, where f on the rims of the others is at least t plus that sum: before it
+enters one of those, it is as long.
 
 **Rounding.** The numbers of the mesh and of the file are taken as exact. Whatever is computed from
 them is a ball: a midpoint and a radius, which takes in the rounding of each operation. Only IEEE
@@ -390,6 +392,17 @@ class Pieces:
         jumps[rim] = np.maximum(step.high, 0)
         return jumps
 
+    def least(self) -> Array:
+        """Return lower bounds of f on the rim of each face, where paths may cross it."""
+        surface, length = self.surface, self.surface.length
+        edge = np.repeat(np.arange(len(self.count)), self.count)
+        ends = (t * length.m[edge] for t in (self.t0, self.t1))
+        f = self.sigma.m + np.hypot(np.clip(self.a, *ends) - self.a, self.h)
+        size = np.abs(self.sigma.m) + np.abs(self.a) + self.h + length.high[edge]
+        f = f - (self.sigma.r + length.r[edge] + 16 * U * size + TINY) * UP
+        on_edges = np.minimum.reduceat(f, self.start[:-1])[surface.of_face].min(axis=1)
+        return np.minimum(on_edges, self.values[surface.faces].min(axis=1))
+
     def rows(self, k: Array, e: Array, from_lower: Array) -> tuple[Any, Ball, Ball]:
         """Return pieces k, on edges e, measured from their lower or upper end: cone, and extent."""
         length = self.surface.length[e]
@@ -513,21 +526,20 @@ def prove(
     refuse_unless(len(sources) > 0, "there are no sources")
     function = Pieces(surface, given)
     tau, jumps = bounds(surface, function)
-    _rise_from_sources(surface, function, sources, tau)
+    least = function.least()
+    least[_rise_from_sources(surface, function, sources, tau)] = -np.inf
     tau = (tau + jumps[surface.of_face].sum(axis=1)) * UP
-    values = function.values
-    # Only faces count that a path no longer than the value can reach.
-    total = tau.sum() * (1 + 1e-9)
-    least = values[surface.faces].max(axis=1) - surface.length.high[surface.of_face].max(axis=1)
-    least = least - tau - 16 * U * (np.abs(least) + np.abs(values[surface.faces]).max(axis=1) + tau)
-    rank = np.argsort(least)
-    sums = np.concatenate([[0.0], np.cumsum(tau[rank])]) * (1 + 1e-9)
-    passed = np.searchsorted(least[rank], (values + total) + 8 * U * np.abs(values), "right")
-    with np.errstate(invalid="ignore"):
-        lower = values - sums[passed]
-        lower = lower - 4 * U * np.abs(lower)
     is_reached = np.zeros(surface.count, bool)
     is_reached[surface.faces] = True
+    rank, values = np.argsort(least), np.where(is_reached, function.values, np.inf)
+    sums = np.concatenate([[0.0], np.cumsum(tau[rank])]) * (1 + 1e-9)
+    with np.errstate(invalid="ignore"):
+        beyond = least[rank] - sums[:-1]
+        beyond = beyond - 4 * U * np.abs(beyond)
+        before = np.concatenate([[-np.inf], np.fmax.accumulate(beyond - sums[:-1])])
+        inside = np.searchsorted(np.fmax.accumulate(beyond), values)
+        lower = np.maximum(values - sums[inside], before[inside])
+        lower = lower - 4 * U * np.abs(lower)
     lower = np.where(is_reached, lower, np.inf)[surface.label]
     for source in sources:  # a source may be a vertex of no face
         if source.vertex >= 0 and np.isinf(lower[source.vertex]):
@@ -540,8 +552,9 @@ def prove(
 
 def _rise_from_sources(
     surface: Surface, function: Pieces, sources: list[Source], tau: Array
-) -> None:
-    """Raise tau to the largest f(q) - c - |sq| of each face that has a source s."""
+) -> Array:
+    """Raise tau to the largest f(q) - c - |sq| of each face with a source s; return these faces."""
+    found = [np.empty(0, np.int64)]
     for number, source in enumerate(sources):
         refuse_unless(0 <= source.start <= HUGE, f"the start distance of source {number} is none")
         if source.vertex >= 0:
@@ -573,6 +586,8 @@ def _rise_from_sources(
             until = np.full(len(rows), np.inf)
             function.worst(worst, np.arange(len(rows)), out, is_low, cone, -until, until)
             np.maximum.at(tau, rows, worst)
+        found.append(rows)
+    return np.concatenate(found)
 
 
 class Paths(NamedTuple):

@@ -43,12 +43,12 @@ from geodesic_core.kernels.certificates.rises import (
     find_jumps,
     find_rises,
 )
-from geodesic_core.kernels.mesh.half_edges import Topology
+from geodesic_core.kernels.mesh.half_edges import LENGTH, Topology
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.retained.face_windows import FaceWindows, face_windows_of
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.tolerances import CERTIFIED
+from geodesic_core.tolerances import CERTIFIED, STRAIGHT
 
 _SAVED_PATHS = 100
 """Paths in a file, to the farthest vertex and others: they tell how large the gap is"""
@@ -72,12 +72,14 @@ class Certificate:
     mesh: TriangleMesh
     """The surface, with the barriers of the call."""
     lower: Floats
-    """(V,) mesh units: no vertex is nearer; infinite where no path leads from a source."""
+    """(V,) mesh units: no vertex is nearer; infinite where no path leads from a source. Of vertices
+    beyond the limit of the field, only that they are, about."""
     upper: Floats
-    """(V,) mesh units: lengths of paths, start distances counted; infinite where none leads."""
+    """(V,) mesh units: lengths of paths, start distances counted; infinite where none leads within
+    the limit of the field."""
     violations: Floats
     """(F,) mesh units: by how much the function on the edges may rise faster than distances can,
-    across each face; 0 or rounding."""
+    across each face; 0 or rounding, and 0 for faces beyond the limit of the field."""
     holds: bool
     """Whether the distances of the field are proved: that exact ones are, and that approximate ones
     are within their error, and no longer than exact ones; to 1e-8 of the largest distance."""
@@ -89,7 +91,8 @@ class Certificate:
         """The largest difference of the bounds, as a share of the largest distance."""
         reached = np.isfinite(self.upper)
         upper = self.upper[reached]
-        gap, largest = float((upper - self.lower[reached]).max()), float(upper.max())
+        gap = float((upper - self.lower[reached]).max(initial=0.0))
+        largest = float(upper.max(initial=0.0))
         return gap / largest if largest > 0.0 else 0.0
 
     @property
@@ -151,12 +154,16 @@ def certified(sweep: Sweep, result: SweepResult, control: Control) -> Certificat
     if question.has_curves:
         raise InvalidArgument("a field with curves as sources has no certificate yet: give points")
     winners, windows = result.winners, result.windows
-    if winners is None or windows is None or math.isfinite(question.max_distance):
-        whole = replace(whole, question=replace(question, max_distance=math.inf))
+    mesh, limit = question.mesh, question.max_distance
+    if winners is None or windows is None or math.isfinite(limit):
+        # Faces at the limit must have all windows.
+        limit += float(mesh.topology.geometry[:, LENGTH].max()) * (1.0 + STRAIGHT)
+        whole = replace(whole, question=replace(question, max_distance=limit))
         wave = whole.run(control.for_part(0, 4), "windows")
         winners, windows = all_winners(wave), face_windows_of(wave)
-    mesh = question.mesh
-    values = winners.vertices.distance[mesh.topology.inner_vertex]
+    distances = winners.vertices.distance[mesh.topology.inner_vertex]
+    is_beyond = np.isinf(distances) & np.isin(mesh.components, question.nodes.components)
+    values = np.where(is_beyond, limit, distances)
     surface = verify.Surface(
         None if mesh.lengths is not None else mesh.vertices,
         mesh.faces,
@@ -165,6 +172,7 @@ def certified(sweep: Sweep, result: SweepResult, control: Control) -> Certificat
         mesh.barriers,
     )
     values = values[surface.label]
+    within = np.where(distances <= question.max_distance, distances, np.inf)[surface.label]
     sources = [
         _source(line[0], start)
         for line, start in zip(question.polylines, question.start_distances.tolist(), strict=True)
@@ -175,15 +183,17 @@ def certified(sweep: Sweep, result: SweepResult, control: Control) -> Certificat
     bounds = partial(rises_and_jumps, control=control.for_part(2, 4))
     proof = verify.prove(surface, sources, arrays, bounds)
     upper, paths = _upper_bounds(
-        question, surface, numbers, sources, winners, values, control.for_part(3, 4)
+        question, surface, numbers, sources, winners, within, control.for_part(3, 4)
     )
     reached = np.isfinite(upper)
-    slack = CERTIFIED * float(upper[reached].max())
-    most = whole.upper_bounds(values[reached])
-    values, lower, high = (array[reached] for array in (values, proof.lower, upper))
-    holds = bool((values - lower <= slack).all() and (high - most <= slack).all())
+    slack = CERTIFIED * float(upper[reached].max(initial=0.0))
+    most = whole.upper_bounds(within[reached])
+    found, lower, high = (array[reached] for array in (within, proof.lower, upper))
+    holds = bool((found - lower <= slack).all() and (high - most <= slack).all())
+    counts = reached[mesh.faces].any(axis=1)
     control.finish()
-    return Certificate(mesh, proof.lower, upper, proof.tau, holds, arrays | paths)
+    violations = np.where(counts, proof.tau, 0.0)
+    return Certificate(mesh, proof.lower, upper, violations, holds, arrays | paths)
 
 
 def _numbers(topology: Topology, surface: verify.Surface) -> Numbers:
@@ -279,8 +289,8 @@ def _upper_bounds(
     values: Floats,
     control: Control,
 ) -> tuple[Floats, dict[str, Floats | Longs]]:
-    """Return lengths of paths to all vertices, and some of the paths."""
-    upper = np.where(np.isfinite(values), np.inf, values)
+    """Return lengths of paths to all vertices that have values, and some of the paths."""
+    upper = np.full(len(values), np.inf)
     for source in sources:
         if source.vertex >= 0:
             is_there = surface.label == surface.label[source.vertex]
@@ -304,7 +314,7 @@ def _upper_bounds(
         lost = ends[np.isinf(lengths)][0]
         raise InternalError(f"the path to vertex {lost} cannot be traced; please report this mesh")
     upper[ends] = np.minimum(upper[ends], lengths)
-    upper = upper[surface.label]
+    upper = np.where(np.isfinite(values), upper[surface.label], np.inf)
     spread = np.linspace(0, len(ends) - 1, min(_SAVED_PATHS, len(ends))).astype(int)
     some = ends[np.argsort(values[ends])[spread]]
     paths = _paths_to(question, surface, winners, some, control)

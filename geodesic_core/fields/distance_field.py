@@ -918,8 +918,8 @@ class DistanceField:
 
         Notes
         -----
-        A field that does not retain its windows, or has a limit, sweeps again. O(windows), and
-        O(length of all paths): ten to eighteen times as long as a sweep.
+        A field that does not retain its windows, or has a limit, sweeps again. O(F + windows), and
+        O(length of all paths): ten to eighteen times as long as a sweep without a limit.
 
         Examples
         --------
@@ -934,7 +934,7 @@ class DistanceField:
         certificate = certified(self._sweep, self._result, control)
         known = np.isfinite(self.distances)
         apart = [
-            np.abs(bounds[known] - self.distances[known]).max()
+            np.abs(bounds[known] - self.distances[known]).max(initial=0.0)
             for bounds in (certificate.lower, certificate.upper)
         ]
         # What is known of the field changes, and not the field.
