@@ -541,6 +541,7 @@ def prove(
         lower = np.maximum(values - sums[inside], before[inside])
         lower = lower - 4 * U * np.abs(lower)
     lower = np.where(is_reached, lower, np.inf)[surface.label]
+    lower = np.maximum(lower, min(source.start for source in sources))
     for source in sources:  # a source may be a vertex of no face
         if source.vertex >= 0 and np.isinf(lower[source.vertex]):
             lower[source.vertex] = source.start

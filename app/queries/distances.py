@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import geodesic_core as gc
-from app.encoding import CSV, JSON, NPY, NPZ, OCTETS, PLY, Answer, Indices, Representation
+from app.encoding import CSV, JSON, NPY, NPZ, OCTETS, PLY, Answer, Indices
 from app.errors import Fault, problem
 from app.queries.accuracy import (
     bound_of,
@@ -29,6 +29,7 @@ from app.queries.points import (
     numbered,
     to_sources,
 )
+from app.queries.proofs import check_proof_format, told
 from app.queries.validation import FAULTS_SHOWN, WrittenPoints, invalid_fields, naming
 from app.queries.views import columns_of, surface_of, table_of_distances
 from app.schemas.points import CurveSource
@@ -76,8 +77,7 @@ class DistancesQuery(FromSources[DistancesRequest]):
         if faults and media_type in (NPY, OCTETS, NPZ):
             detail = "the proof" if media_type == NPZ else "one array"
             raise problem("invalid_request", f"{media_type} holds {detail}", errors=tuple(faults))
-        if media_type == NPZ and self.representation.dtype != Representation.dtype:
-            raise invalid_fields(["/query/dtype"], "a proof is in float64")
+        check_proof_format(media_type, self.representation)
 
     def value_count(self) -> int:
         """Return the number of distances, and of the values that are included with each."""
@@ -131,7 +131,7 @@ class DistancesQuery(FromSources[DistancesRequest]):
             sources=[describe_source(mesh, start) for start in starts],
             **_described(mesh, targets),
             distances=distances,
-            **_told(certificate),
+            **(told(certificate, certificate.relative_gap) if certificate else {}),
             unreachable=_unreachable(mesh, sources, targets, distances),
             stats=stats_of(field.stats),
         )
@@ -173,14 +173,6 @@ def _check_vertices(targets: SurfacePoints) -> None:
     if off:
         places = [f"/targets/{i}" for i in off[:FAULTS_SHOWN]]
         raise invalid_fields(places, "is no vertex: a certificate proves distances of vertices")
-
-
-def _told(certificate: gc.Certificate | None) -> dict[str, Any]:
-    """Return the member that tells what a certificate proves."""
-    if certificate is None:
-        return {}
-    names = "holds", "relative_gap", "worst_face", "worst_violation"
-    return {"certificate": {name: getattr(certificate, name) for name in names}}
 
 
 def _described(mesh: gc.TriangleMesh, targets: SurfacePoints | None) -> dict[str, Any]:

@@ -7,14 +7,15 @@ from itertools import chain
 from typing import Any
 
 import geodesic_core as gc
-from app.encoding import CSV, JSON, NPY, OBJ, OCTETS, Answer
+from app.encoding import CSV, JSON, NPY, NPZ, OBJ, OCTETS, Answer
 from app.errors import Fault, ProblemError, pointer
 from app.queries import point_text
-from app.queries.accuracy import options_of, solve_field, with_default_accuracy
+from app.queries.accuracy import bound_of, options_of, solve_field, with_default_accuracy
 from app.queries.base import VALUES_OF_POINT, ExecutionContext, Query
-from app.queries.cost_model import search_seconds, share_reached, sweep_seconds
+from app.queries.cost_model import PER_FACE_CERTIFIED, search_seconds, share_reached, sweep_seconds
 from app.queries.outline import SHOWN, no_outline, outline_of
 from app.queries.points import SurfacePoints, describe_point, numbered
+from app.queries.proofs import check_proof_format, told
 from app.queries.validation import (
     WrittenPoints,
     check_count,
@@ -28,17 +29,30 @@ from app.schemas.requests import EFFORT_OF_PATHS, PathParameters, PathRequest
 from app.settings import Settings
 from app.store.meshes import OpenMesh
 
+_BEYOND = 1e-9
+"""Share of the length by which a proof looks beyond it: distances round differently"""
+
 
 class PathQuery(Query[PathRequest]):
     """The shortest path between two points, past ``waypoints`` in their order."""
 
     kind = "path"
     model = PathRequest
-    offers: Sequence[str] = (JSON, NPY, OCTETS, OBJ, CSV)
+
+    @property
+    def offers(self) -> Sequence[str]:
+        """The media types of the answer: a proof is one as well."""
+        return (JSON, NPY, OCTETS, OBJ, CSV, *([NPZ] if self.request.certify else []))
 
     @classmethod
     def normalized(cls, request: PathRequest) -> PathRequest:
-        """Name error or effort; refuse waypoints where the path is approximate."""
+        """Name error or effort; refuse waypoints where the path is approximate, and some proofs."""
+        if request.certify and request.method != "exact":
+            raise invalid_fields(["/certify"], "goes with method 'exact' only")
+        if request.certify and request.waypoints:
+            raise invalid_fields(
+                ["/certify"], "a path past waypoints has no certificate: ask for each leg's"
+            )
         if request.method == "approximate" and request.waypoints:
             raise invalid_fields(["/waypoints"], "goes with methods 'exact' and 'fast' only")
         if request.method == "fast" and request.effort is None:
@@ -48,6 +62,10 @@ class PathQuery(Query[PathRequest]):
     def check_limits(self, settings: Settings) -> None:
         """Refuse too many waypoints."""
         check_count("waypoints", len(self.request.waypoints), settings, "max_waypoints")
+
+    def check_format(self, media_type: str) -> None:
+        """Refuse a proof that is rounded."""
+        check_proof_format(media_type, self.representation)
 
     def written_points(self) -> WrittenPoints:
         """Yield the source, the target, then the waypoints."""
@@ -60,12 +78,17 @@ class PathQuery(Query[PathRequest]):
         if request.method == "approximate":
             share = share_reached(self.size, 1, request.max_distance)
             return sweep_seconds(self.size.faces, request, share)
-        return search_seconds(self.size.faces, 1 + len(request.waypoints))
+        proof = PER_FACE_CERTIFIED * self.size.faces if request.certify else 0.0
+        return search_seconds(self.size.faces, 1 + len(request.waypoints)) + proof
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Search for an exact or a fast path, or sweep for an approximate one."""
         request = self.request
         source, target, *waypoints = points
+        if request.certify and source.vertex_index is None and target.vertex_index is None:
+            message = "one end must be a vertex: a certificate proves distances of vertices"
+            raise invalid_fields(["/source", "/target"], message)
+        searching = context.part(0, 2) if request.certify else context
         try:
             if request.method == "approximate":
                 start = [gc.Source(source)]
@@ -85,14 +108,19 @@ class PathQuery(Query[PathRequest]):
                     waypoints,
                     request.max_distance,
                     **options_of(request),
-                    **context.options,
+                    **searching.options,
                 )
         except gc.errors.NoPath as error:
             bound = gc.error_bound(opened.mesh, **options_of(request))
-            return self._answer(opened, points, no_outline(error.reason, bound))
-        answer = self._answer(opened, points, outline_of(path))
+            nothing = self._answer(opened, points, no_outline(error.reason, bound))
+            return replace(nothing, named={} if request.certify else None)
+        outline, proof = outline_of(path), None
+        if request.certify:
+            proof, proved = _proved(opened, path.length, source, target, context.part(1, 2))
+            outline |= proved
+        answer = self._answer(opened, points, outline)
         values = VALUES_OF_POINT * len(path.locations)
-        return replace(answer, values=values, array=lambda: path.points)
+        return replace(answer, values=values, array=lambda: path.points, named=proof)
 
     def _answer(self, opened: OpenMesh, points: SurfacePoints, found: dict[str, Any]) -> Answer:
         source, target, *waypoints = (describe_point(opened.mesh, point) for point in points)
@@ -104,6 +132,30 @@ class PathQuery(Query[PathRequest]):
             waypoints=waypoints,
         )
         return Answer(members | found, ("points",), SHOWN, lines=lambda: [line_of(found)])
+
+
+def _proved(
+    opened: OpenMesh,
+    length: float,
+    source: gc.SurfacePoint,
+    target: gc.SurfacePoint,
+    context: ExecutionContext,
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return what proves the length of a shortest path, and the members that tell of it.
+
+    It is a proof of distances from the source, or from the target where that is no vertex.
+    """
+    start, end = (target, source) if target.vertex_index is None else (source, target)
+    limit = length * (1.0 + _BEYOND)
+    sweep, proof = context.part(0, 2).options, context.part(1, 2).options
+    field = opened.solver.exact_distance(start, limit, retain="distances", **sweep)
+    certificate = field.certify(**proof)
+    lower, upper = (
+        float(bounds[end.vertex_index]) for bounds in (certificate.lower, certificate.upper)
+    )
+    bound = gc.ErrorBound("absolute", max(upper - length, length - lower), "certified")
+    gap = (upper - lower) / upper if upper > 0.0 else 0.0
+    return certificate.arrays, {"error_bound": bound_of(bound), **told(certificate, gap)}
 
 
 # As a GET

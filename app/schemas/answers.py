@@ -357,6 +357,12 @@ class Outline(BaseModel):
 class PathAnswer(Outline):
     """A path from source to target, or the reason why there is none."""
 
+    certificate: Certificate | None = Field(
+        default=None,
+        description="What the proof tells, if asked for by `certify`; `relative_gap` is that of "
+        "the length",
+    )
+
     kind: Literal["path"]
     mesh_id: str
     method: Method

@@ -391,6 +391,12 @@ class PathRequest(AccuracyOrEffort, Stops):
         description="For `fast`: more effort takes more time, and seldom gives a shorter path; "
         f"{EFFORT_OF_PATHS} by default",
     )
+    certify: StrictBool = Field(
+        default=False,
+        description="Also prove that no path is shorter, for `exact` without waypoints, where one "
+        "end is a vertex. The answer has a `certificate`, and as `npz` it is the file that "
+        "`geodesic-verify` checks, with the source; with the target if that is no vertex",
+    )
 
 
 class StepsRequest(Stops):

@@ -109,6 +109,8 @@ class Path:
     error_bound: ErrorBound
     reason: str | None
     """``disconnected`` or ``beyond_max_distance``; None for a path"""
+    certificate: Certificate | None = None
+    """What the proof of its length tells; None if none was requested"""
 
 
 @dataclass(frozen=True)
@@ -398,7 +400,6 @@ def to_distances(response: httpx2.Response) -> Distances:
         distances = _with_infinity(members["distances"])
     nearest, gradient = members.get("nearest_source"), members.get("gradient")
     lower, upper, violations = (members.get(name) for name in ("lower", "upper", "violations"))
-    certificate = members.get("certificate")
     return Distances(
         mesh_id=members["mesh_id"],
         method=members["method"],
@@ -410,8 +411,13 @@ def to_distances(response: httpx2.Response) -> Distances:
         lower=None if lower is None else _with_infinity(lower),
         upper=None if upper is None else _with_infinity(upper),
         violations=None if violations is None else np.array(violations, np.float64),
-        certificate=None if certificate is None else Certificate(**certificate),
+        certificate=_to_certificate(members),
     )
+
+
+def _to_certificate(members: Mapping[str, Any]) -> Certificate | None:
+    certificate = members.get("certificate")
+    return None if certificate is None else Certificate(**certificate)
 
 
 def to_path(response: httpx2.Response) -> Path:
@@ -433,6 +439,7 @@ def _to_path(document: Mapping[str, Any]) -> Path:
         locations=document.get("locations") or [],
         error_bound=ErrorBound(**document["error_bound"]),
         reason=document.get("reason"),
+        certificate=_to_certificate(document),
     )
 
 

@@ -234,9 +234,13 @@ def path(
     effort: Literal[1, 2, 4, 8] | None = None,
     max_distance: float | None = None,
     barriers: Sequence[int] = (),
+    certify: bool = False,
     progress: Progress = ignore_progress,
 ) -> Flow[Path]:
-    """Return the shortest path from source to target, past waypoints in their order."""
+    """Return the shortest path from source to target, past waypoints in their order.
+
+    With ``certify`` it is proved that no path is shorter.
+    """
     body = _body(
         source=source,
         target=target,
@@ -247,6 +251,7 @@ def path(
         effort=effort,
         max_distance=max_distance,
         barriers=barriers,
+        certify=certify or None,  # older services do not know it
     )
     return (yield from _ask(mesh, "path", body, to_path, progress))
 

@@ -2553,6 +2553,8 @@ export interface components {
              */
             faces: number[] | null;
             error_bound: components["schemas"]["ErrorBound"];
+            /** @description What the proof tells, if asked for by `certify`; `relative_gap` is that of the length */
+            certificate?: components["schemas"]["Certificate"] | null;
             /**
              * Kind
              * @constant
@@ -2642,6 +2644,11 @@ export interface components {
              * @description For `fast`: more effort takes more time, and seldom gives a shorter path; 1 by default
              */
             effort?: (1 | 2 | 4 | 8) | null;
+            /**
+             * Certify
+             * @description Also prove that no path is shorter, for `exact` without waypoints, where one end is a vertex. The answer has a `certificate`, and as `npz` it is the file that `geodesic-verify` checks, with the source; with the target if that is no vertex. Default: `false`
+             */
+            certify?: boolean;
         };
         /**
          * PathTo

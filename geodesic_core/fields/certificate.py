@@ -82,7 +82,8 @@ class Certificate:
     across each face; 0 or rounding, and 0 for faces beyond the limit of the field."""
     holds: bool
     """Whether the distances of the field are proved: that exact ones are, and that approximate ones
-    are within their error, and no longer than exact ones; to 1e-8 of the largest distance."""
+    are within their error, and no longer than exact ones; to 1e-8 of the largest distance, or of
+    the limit."""
     arrays: dict[str, Floats | Longs]
     """The function on the edges, and paths to some of the vertices."""
 
@@ -186,7 +187,8 @@ def certified(sweep: Sweep, result: SweepResult, control: Control) -> Certificat
         question, surface, numbers, sources, winners, within, control.for_part(3, 4)
     )
     reached = np.isfinite(upper)
-    slack = CERTIFIED * float(upper[reached].max(initial=0.0))
+    largest = question.max_distance if math.isfinite(question.max_distance) else 0.0
+    slack = CERTIFIED * float(upper[reached].max(initial=largest))
     most = whole.upper_bounds(within[reached])
     found, lower, high = (array[reached] for array in (within, proof.lower, upper))
     holds = bool((found - lower <= slack).all() and (high - most <= slack).all())

@@ -91,6 +91,15 @@ def test_certificates_are_the_library_s_to_the_bit(
     }
 
 
+def test_a_path_is_certified(service: Client, mesh: Mesh) -> None:
+    path = service.path(mesh, 0, 7, certify=True)
+    assert path.error_bound.kind == "certified"
+    assert path.certificate is not None
+    assert path.certificate.holds
+    assert path.certificate.relative_gap <= 1e-9
+    assert service.path(mesh, 0, 7).certificate is None
+
+
 @pytest.mark.parametrize("source", [7, np.int64(7), {"vertex": 7}], ids=repr)
 def test_a_single_source_needs_no_list(service: Client, mesh: Mesh, source: Any) -> None:
     distances, lines = service.distances(mesh, source), service.isolines(mesh, source, count=3)

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -171,6 +172,70 @@ def test_only_proofs_come_as_archives_and_whole(client: TestClient, knot: str) -
         (fault,) = check_problem(refused, 422, "invalid_request")["errors"]
         assert fault["pointer"] == "/include"
         assert fault["message"].endswith("ask for json")
+
+
+# Paths
+
+
+INSIDE = {"face": 7, "barycentric": [0.2, 0.3, 0.5]}
+
+
+@pytest.mark.parametrize(
+    ("ends", "start"),
+    [((3, 200), "3"), ((INSIDE, 200), "f7:0.2,0.3,0.5"), ((200, INSIDE), "f7:0.2,0.3,0.5")],
+)
+def test_a_path_is_proved_to_be_shortest(
+    client: TestClient, knot: str, tmp_path: Path, ends: tuple, start: str
+) -> None:
+    mesh, link = stored_mesh(client, knot), f"/v1/meshes/{knot}/path"
+    body = {"source": ends[0], "target": ends[1], "certify": True}
+
+    answer = client.post(link, json=body).json()
+
+    bound = answer["error_bound"]
+    assert (bound["type"], bound["kind"]) == ("absolute", "certified")
+    assert bound["value"] <= 1e-9 * answer["length"]
+    assert answer["certificate"]["holds"]
+    assert 0 < answer["certificate"]["relative_gap"] <= 1e-9
+    plain = client.post(link, json=body | {"certify": False}).json()
+    assert plain["points"] == answer["points"]
+    assert "certificate" not in plain
+    np.savez(tmp_path / "knot.npz", vertices=mesh.vertices, faces=mesh.faces)
+    proof = client.post(link + "?format=npz", json=body)
+    assert '"holds":true' in proof.headers["geodesic-certificate"]
+    (tmp_path / "proof.npz").write_bytes(proof.content)
+    assert check(tmp_path, "--source", start).returncode == 0
+    assert check(tmp_path, "--source", "40").returncode == 1
+
+
+@pytest.mark.parametrize(
+    ("body", "places"),
+    [
+        ({"method": "fast"}, ["/certify"]),
+        ({"method": "approximate"}, ["/certify"]),
+        ({"waypoints": [9]}, ["/certify"]),
+        ({"source": INSIDE, "target": INSIDE}, ["/source", "/target"]),
+    ],
+)
+def test_paths_without_proof_are_refused(
+    client: TestClient, knot: str, body: dict, places: list
+) -> None:
+    asked = {"source": 3, "target": 200, "certify": True} | body
+    refused = client.post(f"/v1/meshes/{knot}/path", json=asked)
+    problem = check_problem(refused, 422, "invalid_request")
+    assert [fault["pointer"] for fault in problem["errors"]] == places
+
+
+def test_there_is_no_proof_of_no_path(client: TestClient, knot: str) -> None:
+    body = {"source": 3, "target": 200, "certify": True, "max_distance": 0.1}
+    response = client.post(f"/v1/meshes/{knot}/path?format=npz", json=body)
+    assert response.status_code == 200
+    assert response.headers["geodesic-reason"] == "beyond_max_distance"
+    with np.load(BytesIO(response.content)) as nothing:
+        assert list(nothing) == []
+
+
+# As work
 
 
 def test_its_values_count(tmp_path: Path) -> None:
