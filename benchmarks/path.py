@@ -68,9 +68,10 @@ FEWER = 2.0
 """Times fewer faces that step 2 visits with landmarks, at least."""
 
 FAST_MESHES = (
-    "bunny.obj, Loop",
+    SMOOTH,
     "fandisk.obj, Loop, Loop",
     "horse97k.ply",
+    "bunny.obj",
     "buddha30k.ply",
     "teapot.obj",
 )
