@@ -52,9 +52,8 @@ def kind_of(path: Path, wanted: Sequence[str]) -> str:
     InvalidArgument
         It ends in none of them.
     """
-    name = path.name.lower()
     for kind in wanted:
-        if name.endswith(kind):
+        if path.name.lower().endswith(kind):
             return kind
     raise InvalidArgument(f"{path} must end in {', '.join(wanted)}")
 
@@ -62,18 +61,12 @@ def kind_of(path: Path, wanted: Sequence[str]) -> str:
 def brain_models(structures: Sequence[Structure], vertices: Longs) -> Any:
     """Return the axis of some vertices, ascending, each by its structure."""
     axis = nibabel("cifti2", "writing CIFTI").BrainModelAxis
-    inside = [vertices[_among(each, vertices)] - each.first for each in structures]
     models = [
         axis.from_surface(ids, each.count, each.cifti_name)
-        for each, ids in zip(structures, inside, strict=True)
-        if len(ids)
+        for each in structures
+        if len(ids := each.of(vertices))
     ]
     return reduce(add, models)
-
-
-def _among(structure: Structure, vertices: Longs) -> NDArray[np.bool_]:
-    part = structure.part
-    return np.asarray((vertices >= part.start) & (vertices < part.stop))
 
 
 def parcels_axis(structures: Sequence[Structure], parcels: "Parcellation") -> Any:

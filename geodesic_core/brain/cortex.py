@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from geodesic_core.arrays import Floats, Longs
 from geodesic_core.brain.maps import Maps, MapSource, read_maps
-from geodesic_core.brain.structures import Side, Structure, side_named, side_of_file, side_of_image
+from geodesic_core.brain.structures import Side, Structure, side_of_file, side_of_image
 from geodesic_core.control import Control
 from geodesic_core.errors import BlockedSource, InvalidArgument, NoSuchLabel, OtherSurface
 from geodesic_core.io.as_mesh import as_mesh, join_meshes
@@ -92,10 +92,7 @@ class Cortex:
         >>> cortex.region_of(cortex.structures[0])
         array([3, 5])
         """
-        part = structure.part
-        inside = (self.region >= part.start) & (self.region < part.stop)
-        vertices: Longs = self.region[inside] - structure.first
-        return vertices
+        return structure.of(self.region)
 
     def in_words(self, vertex: int) -> str:
         """Return a vertex of the mesh as users number it.
@@ -117,6 +114,15 @@ class Cortex:
         """
         structure = next(s for s in self.structures if s.part.start <= vertex < s.part.stop)
         return f"vertex {vertex - structure.first} of the {structure.side} surface"
+
+
+def as_values(values: ArrayLike, cortex: Cortex) -> Floats:
+    """Return values at the vertices of a cortex, (V,) or (M, V) float64, or refuse others."""
+    given, count = np.asarray(values, np.float64), len(cortex.mesh.vertices)
+    if given.ndim not in (1, 2) or given.shape[-1] != count:
+        message = f"the values have shape {given.shape}, for {count} vertices"
+        raise OtherSurface(message, given.size, count)
+    return given
 
 
 def load_cortex(
@@ -234,13 +240,15 @@ def _meshes_by_side(surfaces: Any) -> Iterator[tuple[Side, TriangleMesh]]:
 def _side_of(surface: Any) -> Side | None:
     if isinstance(surface, str | Path):
         file = read_unpacked(surface, (), None, Control())
-        return side_of_file(file) or side_named(Path(surface).name)
+        return side_of_file(file)
     return side_of_image(surface) if hasattr(surface, "darrays") else None
 
 
 def _region(roi: MapSource, structures: list[Structure]) -> Longs:
     total = sum(each.count for each in structures)
-    listed = np.asarray(roi) if isinstance(roi, list | np.ndarray) else np.empty(0)
+    if isinstance(roi, list) and all(isinstance(each, int | np.integer) for each in roi):
+        roi = np.asarray(roi)
+    listed = roi if isinstance(roi, np.ndarray) else np.empty(0)
     if listed.ndim == 1 and listed.dtype.kind in "iu" and len(listed) != total:
         if listed.min(initial=0) < 0 or listed.max(initial=0) >= total:
             raise OtherSurface(f"the roi lists vertices beyond {total - 1}", len(listed), total)

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from numpy.typing import NDArray
 
-from geodesic_core.brain.cifti import brain_models, write_cifti
+from geodesic_core.brain.cifti import brain_models, kind_of, write_cifti
 from geodesic_core.brain.cortex import Cortex
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument
@@ -81,14 +81,10 @@ def write_distances(
     (3, 3)
     """
     path = Path(out)
-    if path.name.lower().endswith(_NIFTI):
-        if not path.name.lower().endswith(_DCONN):
-            raise InvalidArgument(f"{path} must end in {_DCONN}")
-        if dtype != "float32":
-            raise InvalidArgument(f"{path} has float32 distances, as all of CIFTI")
-    elif path.suffix.lower() not in SUFFIXES:
-        raise InvalidArgument(f"{path} must end in {', '.join((_DCONN, *SUFFIXES))}")
-    axis = brain_models(cortex.structures, cortex.region) if path.suffix == _NIFTI else None
+    is_cifti = kind_of(path, (_DCONN, *SUFFIXES)) == _DCONN
+    if is_cifti and dtype != "float32":
+        raise InvalidArgument(f"{path} has float32 distances, as all of CIFTI")
+    axis = brain_models(cortex.structures, cortex.region) if is_cifti else None
 
     def write_dconn(table: NDArray[Any], facts: Facts, scratch: Path) -> None:
         # The matrix is symmetric, and nibabel writes columns: which are then rows, as mapped.

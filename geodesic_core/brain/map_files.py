@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from geodesic_core.arrays import Floats
 from geodesic_core.brain.cifti import brain_models, kind_of, nibabel, write_cifti
-from geodesic_core.brain.cortex import Cortex
+from geodesic_core.brain.cortex import Cortex, as_values
 from geodesic_core.brain.maps import MapSource, read_maps
 from geodesic_core.brain.parcellation import Parcellation
-from geodesic_core.errors import InvalidArgument, OtherSurface
+from geodesic_core.errors import InvalidArgument
 
 _METRICS = (".func.gii", ".shape.gii")
 _HUE_STEP, _SATURATION, _VALUE = 0.6180339887, 0.6, 0.9
@@ -37,7 +37,7 @@ def load_maps(source: MapSource, cortex: Cortex) -> Floats:
 
     Raises
     ------
-    InvalidArgument, OtherSurface, MissingExtra
+    InvalidArgument, MissingExtra
         As in `load_cortex`.
 
     Examples
@@ -84,11 +84,7 @@ def write_maps(path: str | Path, cortex: Cortex, values: ArrayLike, names: Seque
     """
     target = Path(path)
     kind = kind_of(target, (".dscalar.nii", *_METRICS))
-    maps = np.atleast_2d(np.asarray(values, np.float32))
-    count = len(cortex.mesh.vertices)
-    if maps.shape[1] != count:
-        message = f"there are {maps.shape[1]} values for {count} vertices"
-        raise OtherSurface(message, maps.shape[1], count)
+    maps = np.atleast_2d(as_values(values, cortex)).astype(np.float32)
     if len(names) != len(maps):
         raise InvalidArgument(f"there are {len(names)} names for {len(maps)} maps")
     if kind in _METRICS:

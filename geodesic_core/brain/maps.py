@@ -13,7 +13,8 @@ from geodesic_core.brain.cifti import nibabel, open_cifti
 from geodesic_core.brain.structures import Structure, side_of_image
 from geodesic_core.control import Control
 from geodesic_core.errors import GeodesicError, InvalidArgument, InvalidMesh, OtherSurface
-from geodesic_core.io.annotation import check_vertices, read_annotation
+from geodesic_core.io.annotation import read_annotation
+from geodesic_core.io.label import read_label
 from geodesic_core.io.unpacking import NamedBytes, read_unpacked
 
 Table = Mapping[int, str]
@@ -32,8 +33,6 @@ class Maps(NamedTuple):
     """(M,)"""
     table: Table | None
     """Where the values are labels"""
-    is_list: bool = False
-    """True for a file that lists vertices: these are 1"""
 
 
 def read_maps(source: MapSource, structures: Sequence[Structure]) -> list[Maps]:
@@ -78,7 +77,7 @@ def _by_structure(source: MapSource, structures: Sequence[Structure]) -> list[Ma
         if missing:
             raise InvalidArgument(f"there is none for the {missing[0]} hemisphere")
         source = [source[each.side] for each in structures]
-    if isinstance(source, list | tuple) and not _is_row(source):
+    if isinstance(source, list | tuple):
         if len(source) == 1:
             (source,) = source
         elif len(source) == len(structures):
@@ -99,10 +98,6 @@ def _by_structure(source: MapSource, structures: Sequence[Structure]) -> list[Ma
         parts = source.data.parts
         return [Maps(np.atleast_2d(_floats(parts[s.side]).T), (), None) for s in structures]
     return _split(_floats(source), structures)
-
-
-def _is_row(source: Sequence[Any]) -> bool:
-    return all(isinstance(each, int | float | np.number) for each in source)
 
 
 def _floats(values: Any) -> Floats:
@@ -212,12 +207,8 @@ def _annot(file: NamedBytes, _path: Path, structure: Structure) -> Maps:
 
 
 def _label(file: NamedBytes, _path: Path, structure: Structure) -> Maps:
-    lines = file.data.decode("utf-8", "replace").splitlines()[2:]
-    vertices = np.array([int(line.split()[0]) for line in lines if line.strip()], np.int64)
-    check_vertices(vertices, structure.count)
-    values = np.zeros((1, structure.count))
-    values[0, vertices] = 1.0
-    return Maps(values, ("",), None, is_list=True)
+    inside = read_label(file.data, structure.count)
+    return Maps(inside[None].astype(np.float64), ("",), None)
 
 
 def _morphometry(_file: NamedBytes, path: Path, _structure: Structure) -> Maps:

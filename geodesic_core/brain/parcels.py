@@ -2,7 +2,6 @@
 
 from __future__ import annotations  # help() shows the names of types, not what they stand for
 
-import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,7 +16,6 @@ from geodesic_core.brain.cifti import brain_models, nibabel, parcels_axis, write
 from geodesic_core.brain.map_files import write_labels
 from geodesic_core.brain.parcellation import Parcellation
 from geodesic_core.control import Control
-from geodesic_core.errors import InvalidArgument
 from geodesic_core.fields.methods import Accuracy, Effort, Method
 from geodesic_core.fields.path import ErrorBound
 from geodesic_core.matrices.formats import sha256_of
@@ -105,9 +103,11 @@ def parcel_distances(
     Raises
     ------
     InvalidArgument
-        Also where the folder holds part of another call, or cannot be written.
+        Also where the folder holds part of another call.
     Cancelled, DeadlineExceeded, MemoryLimitExceeded, MissingExtra
         As in `write_matrix`.
+    OSError
+        The folder cannot be made or written; finished rows are kept.
 
     Notes
     -----
@@ -131,12 +131,11 @@ def parcel_distances(
     accuracy = Accuracy(method, relative_error, absolute_error, effort)
     most = as_threads(threads)
     out = Path(folder)
-    try:
-        out.mkdir(exist_ok=True)
-    except OSError as error:
-        raise InvalidArgument(f"{out} cannot be made: {error.strerror}") from None
+    out.mkdir(exist_ok=True)
     mesh = parcels.cortex.mesh
-    facts = facts_of(mesh, accuracy, np.inf, _facts_of(parcels))
+    named = {"parcels": parcels.names, "keys": parcels.keys}
+    places = {"parcel_of": parcels.parcel_of.tolist()}
+    facts = facts_of(mesh, accuracy, np.inf, parcels.cortex.facts | named | places)
     sums = GroupSums(parcels.parcel_of, len(parcels.names))
     count = len(sums.order)
     first, last = (
@@ -145,8 +144,8 @@ def parcel_distances(
     )
     asked = (out / _ARRAYS, facts, accuracy, most, first)
     with group_rows(mesh, sums.order, sums.starts, *asked) as rows:
-        for places, each in rows.parts:
-            sums.add(places, each)
+        for part in rows.parts:
+            sums.add(*part)
         centroids = sums.centroids()
         sweep_of = accuracy.sweep_on(mesh)
         between = find_matrix(Workspace(mesh), sweep_of, centroids, None, None, "dense", most, last)
@@ -162,15 +161,6 @@ def parcel_distances(
         _write(found, out, facts)
     control.finish()
     return found
-
-
-def _facts_of(parcels: Parcellation) -> dict[str, Any]:
-    return {
-        **parcels.cortex.facts,
-        "parcels": parcels.names,
-        "keys": parcels.keys,
-        "parcel_of": hashlib.sha256(parcels.parcel_of.tobytes()).hexdigest(),
-    }
 
 
 def _write(found: ParcelDistances, out: Path, facts: dict[str, Any]) -> None:

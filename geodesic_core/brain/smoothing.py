@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geodesic_core.arrays import Floats
-from geodesic_core.brain.cortex import Cortex
-from geodesic_core.errors import InvalidArgument, OtherSurface
+from geodesic_core.brain.cortex import Cortex, as_values
+from geodesic_core.errors import InvalidArgument
 from geodesic_core.matrices.gaussian import REACH, spread
 from geodesic_core.solvers import distance_matrix
 from geodesic_core.validation import is_number
@@ -81,11 +81,7 @@ def smooth(
     """
     if not (is_number(fwhm) and 0.0 < fwhm < math.inf):
         raise InvalidArgument(f"fwhm is {fwhm!r}; it must be a finite number above 0")
-    given = np.asarray(values, np.float64)
-    count = len(cortex.mesh.vertices)
-    if given.ndim not in (1, 2) or given.shape[-1] != count:
-        message = f"the values have shape {given.shape}, for {count} vertices"
-        raise OtherSurface(message, given.shape[-1] if given.ndim else 1, count)
+    given = as_values(values, cortex)
     inside = given[..., cortex.region]
     missing = np.argwhere(~np.isfinite(inside))
     if len(missing):

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Any, Literal
 
+from geodesic_core.arrays import Longs
 from geodesic_core.io.unpacking import NamedBytes
 
 Side = Literal["left", "right"]
@@ -45,6 +46,12 @@ class Structure:
     def part(self) -> slice:
         """Its vertices."""
         return slice(self.first, self.first + self.count)
+
+    def of(self, vertices: Longs) -> Longs:
+        """Return those of some vertices that it has, in its own numbers."""
+        own = vertices - self.first
+        inside: Longs = own[(own >= 0) & (own < self.count)]
+        return inside
 
 
 def side_of_file(file: NamedBytes) -> Side | None:

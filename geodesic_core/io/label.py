@@ -179,9 +179,14 @@ def _inside(data: bytes, kind: str, count: int, label: _Label) -> NDArray[np.boo
 
 
 def _freesurfer(data: bytes, count: int, label: _Label) -> NDArray[np.bool_]:
-    """Return which vertices a label lists: a comment, their number, and a line for each."""
+    """Return which vertices a label lists, which has no name."""
     if label is not None:
         raise InvalidArgument("a .label file has one label without a name; leave the label out")
+    return read_label(data, count)
+
+
+def read_label(data: bytes, count: int) -> NDArray[np.bool_]:
+    """Return which vertices a label lists: a comment, their number, and a line for each."""
     _, declared, *lines = data.decode("utf-8", "replace").splitlines()
     vertices = np.array([int(line.split()[0]) for line in lines if line.strip()], np.int64)
     if len(vertices) != int(declared):
