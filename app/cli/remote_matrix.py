@@ -89,6 +89,7 @@ def _write_facts(wanted: MatrixToWrite, written: WrittenMatrix, service: str, me
         "error_bound": written.error_bound,
         "max_distance": wanted.max_distance,
         "dtype": wanted.dtype,
+        "units": "mesh units",
         "sha256": written.sha256,
     }
     beside = wanted.out.with_name(f"{wanted.out.name}.json")
