@@ -2,7 +2,6 @@
 
 from __future__ import annotations  # help() shows the names of types, not what they stand for
 
-import hashlib
 import json
 import math
 import threading
@@ -232,7 +231,7 @@ def write_formed(
 def facts_of(mesh: TriangleMesh, accuracy: Accuracy, limit: float, others: Facts) -> dict[str, Any]:
     """Return what a matrix is made from: the surface, what was asked, and what is promised."""
     return {
-        "mesh": _digest(*mesh.defining_arrays, mesh.barriers),
+        "mesh": mesh.digest,
         "barriers": mesh.barriers.tolist(),
         **accuracy.chosen,
         "error_bound": asdict(accuracy.promise_on(mesh)),
@@ -282,13 +281,6 @@ def write_beside(path: Path, facts: Facts) -> None:
     """Write what a file holds into another one beside it, one fact a line."""
     rows = (f" {json.dumps(name)}: {json.dumps(fact)}" for name, fact in facts.items())
     path.with_name(f"{path.name}.json").write_text("{\n" + ",\n".join(rows) + "\n}\n")
-
-
-def _digest(*arrays: NDArray[Any]) -> str:
-    digest = hashlib.sha256()
-    for array in arrays:
-        digest.update(np.ascontiguousarray(array).data.cast("B") if array.size else b"-")
-    return digest.hexdigest()
 
 
 class BlockRows:
