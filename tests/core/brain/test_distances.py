@@ -63,6 +63,7 @@ def facts_in(path: Path) -> dict:
 
 
 @pytest.mark.parametrize("wall", ["blocks", "passes"])
+@pytest.mark.jit
 def test_files_hold_the_distances_of_both_hemispheres_and_their_ids(
     surfaces, masks, wall, tmp_path
 ):
@@ -89,6 +90,7 @@ def test_files_hold_the_distances_of_both_hemispheres_and_their_ids(
             np.testing.assert_array_equal(vertices, ids[name])
 
 
+@pytest.mark.jit
 def test_a_wall_that_blocks_makes_ways_longer_and_one_that_passes_none(surfaces, masks, tmp_path):
     tables = {}
     for wall in ("blocks", "passes"):
@@ -99,6 +101,7 @@ def test_a_wall_that_blocks_makes_ways_longer_and_one_that_passes_none(surfaces,
     assert (tables["blocks"] > tables["passes"] * 1.01).any()
 
 
+@pytest.mark.jit
 def test_a_limit_leaves_out_what_is_beyond_it(surfaces, masks, tmp_path):
     cortex = gc.brain.load_cortex(surfaces, masks, "passes")
     expected = by_hand(surfaces, masks, "passes")
@@ -119,6 +122,7 @@ def test_files_of_no_format_are_refused_before_any_work(surfaces, name, options,
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.jit
 def test_corrected_areas_stretch_edges_as_workbench_does(surfaces):
     """By the ratio of the sums of the roots of areas: uniform factors scale all distances."""
     plain = gc.brain.load_cortex(surfaces)

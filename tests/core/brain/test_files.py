@@ -161,6 +161,7 @@ def test_values_and_labels_come_back_to_the_bit(surfaces, masks, tmp_path):
 
 
 @needs_workbench
+@pytest.mark.jit
 def test_workbench_reads_what_is_written(surfaces, masks, tmp_path):
     """Structures, numbers of vertices and values, to the bit of float32."""
     cortex = gc.brain.load_cortex(surfaces, masks, "blocks")

@@ -53,6 +53,7 @@ def found(parcels, tmp_path_factory) -> tuple[gc.brain.ParcelDistances, Path]:
     return gc.brain.parcel_distances(parcels, out), out
 
 
+@pytest.mark.jit
 def test_means_least_and_centroids_are_those_of_a_dense_matrix(parcels, keys, table, found):
     result, _ = found
     left = len(keys["left"])
@@ -76,6 +77,7 @@ def test_means_least_and_centroids_are_those_of_a_dense_matrix(parcels, keys, ta
     assert_array_equal(result.mean, result.mean.T)
 
 
+@pytest.mark.jit
 def test_files_hold_the_same_with_names_and_vertices(parcels, found):
     result, out = found
     names, vertices = list(parcels.names), result.vertices

@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 import geodesic_core as gc
 
 
+@pytest.mark.jit
 def test_mass_and_constants_stay_and_nothing_crosses_a_wall_that_blocks(surfaces, masks):
     cortex = gc.brain.load_cortex(surfaces, masks, "blocks")
     rng = np.random.default_rng(5)
@@ -26,6 +27,7 @@ def test_mass_and_constants_stay_and_nothing_crosses_a_wall_that_blocks(surfaces
     np.testing.assert_array_equal(single, smoothed[0])
 
 
+@pytest.mark.jit
 def test_a_peak_in_the_plane_becomes_the_gaussian_of_its_width():
     plane = gc.samples.plane(3200)
     cortex = gc.brain.load_cortex({"left": plane})
