@@ -187,7 +187,7 @@ def load_cortex(
     >>> ball = gc.samples.sphere(320)
     >>> front = ball.vertices[:, 0] > 0
     >>> cortex = gc.brain.load_cortex({"left": ball}, front, wall="blocks")
-    >>> len(cortex.region) == front.sum()
+    >>> bool(len(cortex.region) == front.sum())
     True
     """
     meshes = dict(_meshes_by_side(surfaces))
