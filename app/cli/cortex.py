@@ -81,7 +81,9 @@ def distances(
     ],
     roi: Roi = None,
     wall: Wall = None,
-    limit: Annotated[float | None, typer.Option(help="Go no farther than this, in mm.")] = None,
+    limit: Annotated[
+        float | None, typer.Option(min=0.0, help="Go no farther than this, in mm.")
+    ] = None,
     corrected_areas: CorrectedAreas = None,
     method: MethodOption = "exact",
     relative_error: RelativeError = None,
@@ -106,7 +108,7 @@ def neighbours(
             callback=writable(".npz", ".parquet", to_stdout=False),
         ),
     ],
-    radius: Annotated[float, typer.Option(help="The radius of each searchlight, in mm.")],
+    radius: Annotated[float, typer.Option(min=0.0, help="The radius of each searchlight, in mm.")],
     roi: Roi = None,
     wall: Wall = None,
     corrected_areas: CorrectedAreas = None,

@@ -239,7 +239,7 @@ def _meshes_by_side(surfaces: Any) -> Iterator[tuple[Side, TriangleMesh]]:
 
 def _side_of(surface: Any) -> Side | None:
     if isinstance(surface, str | Path):
-        file = read_unpacked(surface, (), None, Control())
+        file = read_unpacked(surface, ("gii",), None, Control())
         return side_of_file(file)
     return side_of_image(surface) if hasattr(surface, "darrays") else None
 
