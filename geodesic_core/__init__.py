@@ -13,7 +13,7 @@ Examples
 [0.0, 1.0, 1.0, 1.414]
 """
 
-from geodesic_core import errors, samples
+from geodesic_core import brain, errors, samples
 from geodesic_core.compilation import compile_kernels, warm_up
 from geodesic_core.control import Control
 from geodesic_core.cutting.cut_mesh import CutMesh
@@ -103,6 +103,7 @@ __all__ = [
     "TriangleMesh",
     "approximate_distance",
     "as_mesh",
+    "brain",
     "compile_kernels",
     "cut",
     "distance_matrix",

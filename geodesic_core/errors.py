@@ -13,6 +13,8 @@ They form a tree::
     ├── InvalidArgument         any other argument out of its domain
     │   ├── NoDirection         a vector that has no direction on the surface
     │   ├── NoLoop              loops asked for where every one shrinks to a point
+    │   ├── OtherSurface        values by vertex, or by face, that are those of another surface
+    │   ├── NoSuchLabel         a label or a region that no vertex of a surface has
     │   └── NotEmbedded         what needs space, asked of a mesh given by the lengths of its edges
     ├── NoPath                  not connected, or farther than a limit (``reason``)
     ├── Cancelled               the caller asked the sweep to stop
@@ -25,6 +27,7 @@ What is valid, but hardly meant, is a warning of Python's, see `warnings`::
 
     GeodesicWarning
     ├── EmptyBarrier            a label that blocks no face
+    ├── EmptyParcel             a parcel that has no vertex in the region
     └── BlockedSource           a source that no path leaves, since all of its faces are blocked
 """
 
@@ -260,6 +263,46 @@ class NoLoop(InvalidArgument):
     """
 
 
+class OtherSurface(InvalidArgument):
+    """Values that do not belong to a surface: of another subject or resolution, or one by face.
+
+    Parameters
+    ----------
+    message
+        The sentence for its reader.
+    found
+        Number of values.
+    vertices
+        Number of vertices of the surface.
+
+    Examples
+    --------
+    >>> try:
+    ...     gc.brain.load_cortex({"left": gc.samples.sphere(80)}, np.ones(80), "passes")
+    ... except gc.errors.OtherSurface as error:
+    ...     print(error.found, error.vertices)
+    80 42
+    """
+
+    def __init__(self, message: str, found: int, vertices: int) -> None:
+        super().__init__(message)
+        self.found = found
+        self.vertices = vertices
+
+
+class NoSuchLabel(InvalidArgument):
+    """A label that a file does not have, or one or a region that no vertex is in.
+
+    Examples
+    --------
+    >>> try:
+    ...     gc.brain.load_cortex({"left": gc.samples.sphere(80)}, np.zeros(42), "passes")
+    ... except gc.errors.NoSuchLabel as error:
+    ...     print(error)
+    the roi has no vertex of the left surface
+    """
+
+
 class NotEmbedded(InvalidArgument):
     """What needs space, asked of a mesh that is given by the lengths of its edges.
 
@@ -399,6 +442,16 @@ class EmptyBarrier(GeodesicWarning):
     Examples
     --------
     >>> issubclass(gc.errors.EmptyBarrier, UserWarning)
+    True
+    """
+
+
+class EmptyParcel(GeodesicWarning):
+    """Parcels that have vertices, but none in the region.
+
+    Examples
+    --------
+    >>> issubclass(gc.errors.EmptyParcel, UserWarning)
     True
     """
 

@@ -1,5 +1,6 @@
 """Files of matrices between points from files: what is to be written, and what was."""
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,6 +38,24 @@ class WrittenMatrix(NamedTuple):
     sha256: str
     continued: int | None = None
     """Sweeps that a stopped command had done before; None where a service does them"""
+
+
+def write_facts(out: Path, facts: Mapping[str, Any]) -> None:
+    """Write beside a matrix what it is, as the library does."""
+    beside = out.with_name(f"{out.name}.json")
+    beside.write_text(json.dumps(dict(facts), indent=1) + "\n")
+
+
+def as_members(points: "Points") -> Any:
+    """Return points as members of a request."""
+    if isinstance(points, str):
+        return points
+    return [
+        {"face": point.face_index, "barycentric": point.barycentric}
+        if point.vertex_index is None
+        else point.vertex_index
+        for point in points
+    ]
 
 
 def print_written(

@@ -8,6 +8,7 @@ from typer.exceptions import TyperException
 
 from app import __version__
 from app.cli import batch, compilation, meshes, queries, serve, tables
+from app.cli.cortex import cortex
 from app.cli.steps import Failure, show_help_without_command
 from app.cli.store import store
 from app.cli.words import refusal_of, with_options
@@ -78,4 +79,5 @@ for function in (serve.serve, meshes.info, meshes.sample, tables.matrix, batch.b
 for name, command in queries.COMMANDS.items():
     cli.command(name)(queries.function_of(command))
 cli.command("compile")(compilation.compile_kernels)
+cli.add_typer(cortex, name="cortex")
 cli.add_typer(store, name="store")

@@ -1,19 +1,16 @@
 """Matrices of any size that a service computes, on all machines of its cluster if it has one."""
 
-import json
 import os
 from collections.abc import Callable
 from dataclasses import asdict
 from hashlib import file_digest
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from app.cli.matrix_file import MatrixToWrite, WrittenMatrix
+from app.cli.matrix_file import MatrixToWrite, WrittenMatrix, as_members, write_facts
 from app.cli.steps import Failure, Step, showing
 
 if TYPE_CHECKING:
     from geodesic_client import Client, StoredMatrix
-
-    from app.cli.point_file import Points
 
 
 def write_matrix(wanted: MatrixToWrite, service: str) -> WrittenMatrix:
@@ -64,8 +61,8 @@ def _computed(client: "Client", wanted: MatrixToWrite, service: str) -> "tuple[s
     with showing(f"Computing the matrix at {service}") as step:
         matrix = client.store_matrix(
             stored,
-            _as_members(wanted.sources),
-            _as_members(wanted.sources if wanted.targets is None else wanted.targets),
+            as_members(wanted.sources),
+            as_members(wanted.sources if wanted.targets is None else wanted.targets),
             **wanted.accuracy,
             layout="sparse" if wanted.out.suffix.lower() == ".npz" else "dense",
             max_distance=wanted.max_distance,
@@ -82,17 +79,17 @@ def _write_facts(wanted: MatrixToWrite, written: WrittenMatrix, service: str, me
         "service": service,
         "mesh": mesh_id,
         "barriers": sorted(set(wanted.barriers)),
-        "sources": _as_members(wanted.sources),
-        "targets": _as_members(wanted.sources if wanted.targets is None else wanted.targets),
+        "sources": as_members(wanted.sources),
+        "targets": as_members(wanted.sources if wanted.targets is None else wanted.targets),
         "shape": written.shape,
         **wanted.accuracy,
         "error_bound": written.error_bound,
         "max_distance": wanted.max_distance,
         "dtype": wanted.dtype,
+        "units": "mesh units",
         "sha256": written.sha256,
     }
-    beside = wanted.out.with_name(f"{wanted.out.name}.json")
-    beside.write_text(json.dumps(facts, indent=1) + "\n")
+    write_facts(wanted.out, facts)
 
 
 def _watched(step: Step) -> Callable[[float], None]:
@@ -103,15 +100,3 @@ def _watched(step: Step) -> Callable[[float], None]:
         step.check()
 
     return note
-
-
-def _as_members(points: "Points") -> Any:
-    """Return points as members of a request."""
-    if isinstance(points, str):
-        return points
-    return [
-        {"face": point.face_index, "barycentric": point.barycentric}
-        if point.vertex_index is None
-        else point.vertex_index
-        for point in points
-    ]

@@ -1,6 +1,7 @@
 """Commands that write tables of distances."""
 
 from collections.abc import Mapping
+from hashlib import file_digest
 from pathlib import Path
 from typing import Annotated, Any
 from urllib.parse import urlsplit
@@ -27,8 +28,8 @@ from app.cli.arguments import (
     limits,
     writable,
 )
-from app.cli.ask import WrittenMembers, ask, check
-from app.cli.matrix_file import MatrixToWrite, print_written
+from app.cli.ask import Answered, WrittenMembers, ask, check
+from app.cli.matrix_file import MatrixToWrite, as_members, print_written, write_facts
 from app.cli.output import AsJson, Output
 from app.cli.point_file import points_of
 from app.cli.points import Point
@@ -230,9 +231,44 @@ def _ask_matrix(
     import numpy as np
 
     output.write(answered.answer)
+    if output.out is not None and suffix in (".npy", ".npz"):
+        with files.writing(output.out):
+            _write_facts(output.out, answered, source, target, members)
     reached = np.count_nonzero(np.isfinite(answered.answer.members["distances"]))
     cells = len(source) if layout == "pairs" else len(source) * len(target)
     print_size(output, answered.mesh)
     output.say(f"reached     {reached} of {cells} distances")
     print_bound(output, answered.answer.members["error_bound"])
     print_end(output, answered)
+
+
+def _write_facts(
+    out: Path,
+    answered: Answered,
+    source: list[Point],
+    target: list[Point],
+    members: Mapping[str, Any],
+) -> None:
+    """Write beside a matrix of arrays, which has no room for it, what its rows and columns are."""
+    from app.queries.points import resolve_point
+
+    mesh = answered.mesh
+    sides = {"sources": source, "targets": target}
+    with out.open("rb") as file:
+        checksum = file_digest(file, "sha256").hexdigest()
+    points = {
+        side: as_members([resolve_point(mesh, each.point) for each in given])
+        for side, given in sides.items()
+    }
+    facts = {
+        "mesh": mesh.digest,
+        **members,
+        "barriers": mesh.barriers.tolist(),
+        **points,
+        "shape": [len(source)] if members["layout"] == "pairs" else [len(source), len(target)],
+        "error_bound": answered.answer.members["error_bound"],
+        "dtype": "float64",
+        "units": "mesh units",
+        "sha256": checksum,
+    }
+    write_facts(out, facts)

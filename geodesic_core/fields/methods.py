@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 from geodesic_core.errors import InvalidArgument
 from geodesic_core.fields.fast_sweep import FastSweep, estimated
@@ -67,6 +67,29 @@ def promise_of(
         return EXACT
     errors = _as_errors(relative_error, absolute_error)
     return EXACT if mesh.is_rough else guaranteed(*errors)
+
+
+class Accuracy(NamedTuple):
+    """A method, and its allowed error or its effort."""
+
+    method: Method = "exact"
+    relative_error: float | None = 1e-3
+    absolute_error: float | None = None
+    effort: Effort = 2
+
+    def sweep_on(self, mesh: TriangleMesh) -> SweepOf:
+        """Return its sweep on a mesh; see `sweep_of`."""
+        return sweep_of(mesh, *self)
+
+    def promise_on(self, mesh: TriangleMesh) -> ErrorBound:
+        """Return the error of its distances on a mesh; see `promise_of`."""
+        return promise_of(mesh, *self)
+
+    @property
+    def chosen(self) -> dict[str, Any]:
+        """The method, and the arguments that it takes, by name."""
+        taken = {"approximate": ("relative_error", "absolute_error"), "fast": ("effort",)}
+        return {name: getattr(self, name) for name in ("method", *taken.get(self.method, ()))}
 
 
 def _as_errors(relative: float | None, absolute: float | None) -> tuple[float, float]:

@@ -17,7 +17,7 @@ and takes the vertices to be in order.
 import numpy as np
 
 from geodesic_core.arrays import Longs
-from geodesic_core.errors import InvalidArgument
+from geodesic_core.errors import InvalidArgument, OtherSurface
 
 _SECOND_VERSION = -2
 
@@ -54,7 +54,7 @@ def read_annotation(data: bytes, count: int) -> tuple[Longs, dict[int, tuple[str
     integers = _Integers(data)
     rows = integers.next()
     if not 0 <= rows <= count:
-        raise InvalidArgument(f"it has {rows} vertices, but the mesh has {count}")
+        raise OtherSurface(f"it has {rows} vertices, but the mesh has {count}", rows, count)
     pairs = np.frombuffer(integers.bytes_of(8 * rows), ">i4").reshape(-1, 2).astype(np.int64)
     check_vertices(pairs[:, 0], count)
     codes = np.zeros(count, np.int64)
@@ -67,7 +67,8 @@ def check_vertices(vertices: Longs, count: int) -> None:
     """Refuse vertices that are not among the ``count`` of a mesh."""
     wrong = vertices[(vertices < 0) | (vertices >= count)]
     if len(wrong):
-        raise InvalidArgument(f"it lists vertex {wrong[0]}, but the mesh has {count}")
+        message = f"it lists vertex {wrong[0]}, but the mesh has {count}"
+        raise OtherSurface(message, int(vertices.max()) + 1, count)
 
 
 def _table(integers: _Integers) -> dict[int, tuple[str, int]]:

@@ -5,7 +5,7 @@ None of these libraries is imported: an object is known by its attributes.
 
 from __future__ import annotations  # help() shows the names of types, not what they stand for
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -122,8 +122,9 @@ def as_mesh(mesh: MeshLike) -> TriangleMesh:
         A `TriangleMesh`, which is returned as it is; a tuple that begins with vertices and faces; a
         file, as for `load_mesh`; a dictionary of arrays, as MNE has them; or a mesh of trimesh (a
         scene's parts are placed and joined), meshio, VTK or PyVista (data sets, and composite ones
-        joined), Open3D, nibabel (``GiftiImage``), nilearn, PyMeshLab, vedo, COMPAS or SciPy
-        (``ConvexHull``, ``Delaunay`` of points in a plane).
+        joined), Open3D, nibabel (``GiftiImage``), nilearn (the parts of a ``PolyMesh`` or of a
+        ``SurfaceImage`` joined), PyMeshLab, vedo, COMPAS or SciPy (``ConvexHull``, ``Delaunay`` of
+        points in a plane).
 
     Returns
     -------
@@ -253,6 +254,21 @@ def _from_tensors(mesh: Any) -> TriangleMesh:
     return TriangleMesh(*(each.numpy() if hasattr(each, "numpy") else each for each in arrays))
 
 
+def _joined(parts: Iterable[Any]) -> TriangleMesh:
+    """Return parts as one mesh, in their order."""
+    return join_meshes([as_mesh(part) for part in parts])
+
+
+def join_meshes(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
+    """Return meshes as one, in whose numbers the vertices of each follow those before."""
+    if len(meshes) == 1:
+        return meshes[0]
+    firsts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    faces = [mesh.faces + first for mesh, first in zip(meshes, firsts[:-1], strict=True)]
+    vertices = np.concatenate([mesh.vertices for mesh in meshes])
+    return TriangleMesh(vertices, np.concatenate(faces))
+
+
 def _from_attributes(vertices: str, faces: str) -> Callable[[Any], TriangleMesh]:
     return lambda mesh: TriangleMesh(
         _in_space(getattr(mesh, vertices)), np.asanyarray(getattr(mesh, faces))
@@ -276,13 +292,13 @@ _READERS: tuple[tuple[tuple[str, ...], Callable[[Any], TriangleMesh]], ...] = (
     (("vertices", "faces"), _from_attributes("vertices", "faces")),  # trimesh
     (("vertices", "triangles"), _from_attributes("vertices", "triangles")),  # Open3D
     (("coordinates", "faces"), _from_attributes("coordinates", "faces")),  # nilearn
+    (("parts", "n_vertices"), lambda mesh: _joined(mesh.parts.values())),  # nilearn's PolyMesh
+    (("mesh", "data"), lambda image: as_mesh(image.mesh)),  # nilearn's SurfaceImage
     (("points", "simplices"), _from_attributes("points", "simplices")),  # SciPy
 )
 """Attributes by which an object is known, the more telling ones first, and what reads it."""
 _SEVERAL = (
     ("current_mesh", "one, as meshes.current_mesh()"),  # PyMeshLab's MeshSet
-    ("parts", "one of its parts, as mesh.parts['left']"),  # nilearn's PolyMesh
-    ("mesh", "one of its parts, as image.mesh.parts['left']"),  # nilearn's SurfaceImage
     ("recursive_unpack", "one, as assembly.unpack()[0]"),  # vedo's Assembly
 )
 """Attributes of objects that hold meshes, and which mesh to give instead"""

@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 
 from geodesic_core.arrays import Longs
 from geodesic_core.control import Control
-from geodesic_core.errors import EmptyBarrier, GeodesicError, InvalidArgument, InvalidMesh
+from geodesic_core.errors import (
+    EmptyBarrier,
+    GeodesicError,
+    InvalidArgument,
+    InvalidMesh,
+    NoSuchLabel,
+    OtherSurface,
+)
 from geodesic_core.extras import extra
 from geodesic_core.io.annotation import check_vertices, read_annotation
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
@@ -145,7 +152,8 @@ def _vertices_of(path: Path, mesh: TriangleMesh, label: _Label, outside: bool) -
     try:
         inside = _inside(file.data, file.suffix, count, label)
     except InvalidArgument as error:
-        raise InvalidArgument(f"{path} is not a label of this surface: {error}") from None
+        error.args = (f"{path} is not a label of this surface: {error}",)
+        raise
     except GeodesicError:
         raise
     except Exception as error:  # any failure of a parser
@@ -166,14 +174,19 @@ def _inside(data: bytes, kind: str, count: int, label: _Label) -> NDArray[np.boo
     inside: NDArray[np.bool_] = _READERS[kind](data, count, label)
     if not inside.any():
         named = "is in it" if label is None else f"has the label {label!r}"
-        raise InvalidArgument(f"no vertex {named}")
+        raise NoSuchLabel(f"no vertex {named}")
     return inside
 
 
 def _freesurfer(data: bytes, count: int, label: _Label) -> NDArray[np.bool_]:
-    """Return which vertices a label lists: a comment, their number, and a line for each."""
+    """Return which vertices a label lists, which has no name."""
     if label is not None:
         raise InvalidArgument("a .label file has one label without a name; leave the label out")
+    return read_label(data, count)
+
+
+def read_label(data: bytes, count: int) -> NDArray[np.bool_]:
+    """Return which vertices a label lists: a comment, their number, and a line for each."""
     _, declared, *lines = data.decode("utf-8", "replace").splitlines()
     vertices = np.array([int(line.split()[0]) for line in lines if line.strip()], np.int64)
     if len(vertices) != int(declared):
@@ -209,7 +222,8 @@ def _gifti(data: bytes, count: int, label: _Label) -> NDArray[np.bool_]:
         raise InvalidArgument("it holds no array")
     values = np.asarray(image.darrays[0].data)
     if values.shape != (count,):
-        raise InvalidArgument(f"its values have shape {values.shape}, for {count} vertices")
+        message = f"its values have shape {values.shape}, for {count} vertices"
+        raise OtherSurface(message, len(values), count)
     if label is None:
         return np.asarray((values != 0) & ~np.isnan(values))
     names = image.labeltable.get_labels_as_dict()
@@ -224,8 +238,8 @@ def _known(names: Iterable[str]) -> str:
     return f"its labels are {', '.join(map(repr, names)) or 'none'}"
 
 
-def _unknown(label: _Label, names: Iterable[str]) -> InvalidArgument:
-    return InvalidArgument(f"it has no label {label!r}; {_known(names)}")
+def _unknown(label: _Label, names: Iterable[str]) -> NoSuchLabel:
+    return NoSuchLabel(f"it has no label {label!r}; {_known(names)}")
 
 
 def _number(label: str | float, names: Iterable[str]) -> float:

@@ -21,6 +21,8 @@ SUFFIXES = (*DENSE, *SPARSE)
 
 Facts = Mapping[str, Any]
 """What was asked, as the metadata of a file tell it"""
+DenseWriter = Callable[[NDArray[Any], Facts, Path], None]
+"""Function that writes a file of a dense table, which is mapped"""
 
 _ZARR_CHUNK = 1 << 22  # bytes
 
@@ -45,23 +47,35 @@ def may_replace(out: Path) -> bool:
     return out.suffix.lower() == ".zarr" and kind == "array"
 
 
-def write_table(plan: Plan, blocks: Blocks, dtype: np.dtype[Any], facts: Facts, out: Path) -> None:
-    """Write the file of a table whose blocks are all there, as a whole or not at all."""
+def write_table(
+    plan: Plan,
+    blocks: Blocks,
+    dtype: np.dtype[Any],
+    facts: Facts,
+    out: Path,
+    inside: Facts | None,
+    dense_writers: Mapping[str, DenseWriter],
+) -> None:
+    """Write the file of a table whose blocks are all there, as a whole or not at all.
+
+    An npz file has the facts ``inside``, if any.
+    """
     suffix = out.suffix.lower()
     scratch = blocks.folder / f"whole{suffix}"
     if scratch.is_dir():
         shutil.rmtree(scratch)
-    if suffix in DENSE:
+    if suffix == ".npz":
+        with scratch.open("wb") as file:
+            write_npz(plan, blocks.get, dtype, file, inside)
+    elif suffix == ".parquet":
+        _write_parquet(plan, blocks, dtype, facts, scratch)
+    else:
         whole = scratch.with_suffix(".npy")
         with whole.open("wb") as file:
             write_npy(plan, blocks.get, dtype, file)
-        if suffix == ".zarr":
-            _write_zarr(np.load(whole, mmap_mode="r"), facts, scratch)
-    elif suffix == ".npz":
-        with scratch.open("wb") as file:
-            write_npz(plan, blocks.get, dtype, file)
-    else:
-        _write_parquet(plan, blocks, dtype, facts, scratch)
+        writers = {".zarr": _write_zarr, **dense_writers}
+        if suffix in writers:
+            writers[suffix](np.load(whole, mmap_mode="r"), facts, scratch)
     if out.is_dir():
         shutil.rmtree(out)
     scratch.replace(out)
@@ -82,10 +96,15 @@ def write_npy(
 
 
 def write_npz(
-    plan: Plan, block_of: Callable[[int], NDArray[Any]], dtype: np.dtype[Any], file: IO[bytes]
+    plan: Plan,
+    block_of: Callable[[int], NDArray[Any]],
+    dtype: np.dtype[Any],
+    file: IO[bytes],
+    facts: Facts | None = None,
 ) -> None:
     """Write a sparse table as `scipy.sparse.load_npz` reads it, from its blocks.
 
+    It reads no ``facts``; these are bytes, JSON.
     The bytes are those of `numpy.savez`, which would need all entries at once.
     """
     counts = np.zeros(plan.shape[0] + 1, np.int64)
@@ -102,6 +121,8 @@ def write_npz(
         distances = (entries.distance for entries in sparse.file_rows(plan, block_of))
         _put_parts(archive, "data", dtype, shape, distances)
         _put(archive, "_is_array", np.array(True))
+        if facts is not None:
+            _put(archive, "facts", np.array(json.dumps(dict(facts)).encode()))
 
 
 def _put(archive: ZipFile, name: str, array: NDArray[Any]) -> None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations  # help() shows the names of types, not what they stand for
 
-import hashlib
 import json
 import math
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -19,19 +18,19 @@ from numpy.typing import NDArray
 
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument
-from geodesic_core.fields.methods import Effort, Method, promise_of, sweep_of
+from geodesic_core.fields.methods import Accuracy, Effort, Method
 from geodesic_core.fields.path import ErrorBound
 from geodesic_core.fields.sources import as_points
 from geodesic_core.fields.vertex_points import VertexPoints
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
 from geodesic_core.kernels.jit.cache import sources_digest
 from geodesic_core.matrices import dense, sparse
-from geodesic_core.matrices.blocks import Blocks, rows_of
+from geodesic_core.matrices.blocks import Blocks, Row, rows_of
 from geodesic_core.matrices.driver import fill
 from geodesic_core.matrices.formats import (
-    DENSE,
     SPARSE,
     SUFFIXES,
+    DenseWriter,
     Facts,
     may_replace,
     require,
@@ -41,7 +40,7 @@ from geodesic_core.matrices.formats import (
 from geodesic_core.matrices.plan import Plan
 from geodesic_core.matrices.threads import as_threads
 from geodesic_core.mesh.barriers import with_barriers
-from geodesic_core.mesh.surface_point import Point, SurfacePoint
+from geodesic_core.mesh.surface_point import Point, Points, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.target_sweep import Entries
 from geodesic_core.validation import as_limit, check_choice
@@ -160,50 +159,89 @@ def write_matrix(
     >>> np.load(written.path, mmap_mode="r")[0].round(3).tolist()
     [0.0, 1.0, 1.0, 1.414]
     """
-    control = Control(progress, cancel, deadline_s, memory_limit)
+    return write_formed(
+        as_mesh(mesh),
+        out,
+        sources,
+        targets,
+        Form(),
+        Accuracy(method, relative_error, absolute_error, effort),
+        max_distance,
+        barriers,
+        dtype,
+        threads,
+        Control(progress, cancel, deadline_s, memory_limit),
+    )
+
+
+@dataclass(frozen=True)
+class Form:
+    """What a file holds beside distances, and formats of it beyond those of `write_matrix`."""
+
+    facts: Facts = field(default_factory=lambda: {"units": "mesh units"})
+    are_inside: bool = False
+    """Whether an npz file has the facts as well, as an array of that name"""
+    dense_writers: Mapping[str, DenseWriter] = field(default_factory=dict)
+    """By suffix: what writes a dense matrix, which is mapped"""
+
+
+def write_formed(
+    mesh: TriangleMesh,
+    out: str | Path,
+    sources: Points | Everywhere,
+    targets: Points | Everywhere | None,
+    form: Form,
+    accuracy: Accuracy,
+    max_distance: float | None,
+    barriers: Iterable[int],
+    dtype: Literal["float64", "float32"],
+    threads: int | None,
+    control: Control,
+) -> MatrixFile:
+    """Write a matrix to a file of some form; see `write_matrix`."""
     limit = as_limit(max_distance)
     check_choice("dtype", dtype, ("float64", "float32"))
     most = as_threads(threads)
-    path, suffix = _place_for(out)
-    mesh, control = with_barriers(as_mesh(mesh), barriers, control)
-    method_sweep = sweep_of(mesh, method, relative_error, absolute_error, effort)
-    bound = promise_of(mesh, method, relative_error, absolute_error, effort)
+    path, suffix = _place_for(out, (*SUFFIXES, *form.dense_writers))
+    mesh, control = with_barriers(mesh, barriers, control)
+    method_sweep = accuracy.sweep_on(mesh)
     source_points, rows = _points(mesh, sources, "source", control)
     target_points, columns = (
         (None, rows) if targets is None else _points(mesh, targets, "target", control)
     )
     plan = Plan.of(mesh, source_points, target_points, control, in_order=suffix in SPARSE)
-    chosen: Mapping[str, Mapping[str, Any]] = {
-        "approximate": {"relative_error": relative_error, "absolute_error": absolute_error},
-        "fast": {"effort": effort},
-    }
-    facts = {
-        "mesh": _digest(*mesh.defining_arrays, mesh.barriers),
-        "barriers": mesh.barriers.tolist(),
-        "sources": rows,
-        "targets": columns,
-        "shape": plan.shape,
-        "method": method,
-        **chosen.get(method, {}),
-        "error_bound": asdict(bound),
-        "max_distance": None if math.isinf(limit) else limit,
-        "dtype": dtype,
-        "kernels": sources_digest(),
-    }
-    layout, blocks = dense if suffix in DENSE else sparse, Blocks.beside(path)
+    sides = {"sources": rows, "targets": columns, "shape": plan.shape}
+    facts = facts_of(mesh, accuracy, limit, sides | {"dtype": dtype, **form.facts})
+    layout, blocks = sparse if suffix in SPARSE else dense, Blocks.beside(path)
     with blocks.open(facts):
-        sink = _Rows(plan, blocks, partial(layout.block_of, dtype=np.dtype(dtype)), control)
+        block_of = partial(layout.block_of, dtype=np.dtype(dtype))
+        sink = BlockRows(plan, blocks, rows_of, block_of, control)
         with sink.kept_if_stopped():
             fill(sink, mesh, plan.ends, limit, method_sweep, most, control)
-        write_table(plan, blocks, np.dtype(dtype), facts, path)
+        inside = facts if form.are_inside else None
+        write_table(plan, blocks, np.dtype(dtype), facts, path, inside, form.dense_writers)
+        bound = accuracy.promise_on(mesh)
         written = MatrixFile(path, plan.shape, bound, sha256_of(path), len(sink.sweeps))
-        _write_beside(path, facts | {"sha256": written.sha256})
+        write_beside(path, facts | {"sha256": written.sha256})
         blocks.remove()
     control.finish()
     return written
 
 
-def _place_for(out: str | Path) -> tuple[Path, str]:
+def facts_of(mesh: TriangleMesh, accuracy: Accuracy, limit: float, others: Facts) -> dict[str, Any]:
+    """Return what a matrix is made from: the surface, what was asked, and what is promised."""
+    return {
+        "mesh": mesh.digest,
+        "barriers": mesh.barriers.tolist(),
+        **accuracy.chosen,
+        "error_bound": asdict(accuracy.promise_on(mesh)),
+        "max_distance": None if math.isinf(limit) else limit,
+        **others,
+        "kernels": sources_digest(),
+    }
+
+
+def _place_for(out: str | Path, suffixes: Sequence[str]) -> tuple[Path, str]:
     """Return the path of a file that can be written, and its suffix.
 
     Raises
@@ -213,7 +251,7 @@ def _place_for(out: str | Path) -> tuple[Path, str]:
     """
     path = Path(out)
     suffix = path.suffix.lower()
-    check_choice("the suffix of out", suffix, SUFFIXES)
+    check_choice("the suffix of out", suffix, suffixes)
     if not path.parent.is_dir():
         raise InvalidArgument(f"there is no folder {path.parent}")
     if not may_replace(path):
@@ -223,7 +261,7 @@ def _place_for(out: str | Path) -> tuple[Path, str]:
 
 
 def _points(
-    mesh: TriangleMesh, points: Sequence[Point] | Everywhere, name: str, control: Control
+    mesh: TriangleMesh, points: Points | Everywhere, name: str, control: Control
 ) -> tuple[Sequence[SurfacePoint], Any]:
     """Return canonical points, and how the facts of a file name them, which a service reads too."""
     if isinstance(points, str) and points == "all":
@@ -239,29 +277,28 @@ def _points(
     ]
 
 
-def _write_beside(path: Path, facts: Facts) -> None:
+def write_beside(path: Path, facts: Facts) -> None:
     """Write what a file holds into another one beside it, one fact a line."""
     rows = (f" {json.dumps(name)}: {json.dumps(fact)}" for name, fact in facts.items())
     path.with_name(f"{path.name}.json").write_text("{\n" + ",\n".join(rows) + "\n}\n")
 
 
-def _digest(*arrays: NDArray[Any]) -> str:
-    digest = hashlib.sha256()
-    for array in arrays:
-        digest.update(np.ascontiguousarray(array).data.cast("B") if array.size else b"-")
-    return digest.hexdigest()
-
-
-class _Rows:
+class BlockRows:
     """The rows of blocks that are missing; a block is written once it has all of its own.
 
-    The rows of other blocks are kept from time to time.
+    The rows of other blocks are kept from time to time. ``taken`` makes rows of entries, and
+    ``block_of`` a block of rows.
     """
 
     def __init__(
-        self, plan: Plan, blocks: Blocks, block_of: Callable[..., NDArray[Any]], control: Control
+        self,
+        plan: Plan,
+        blocks: Blocks,
+        taken: Callable[[Entries], Mapping[int, Row]],
+        block_of: Callable[[Plan, int, Mapping[int, Row]], NDArray[Any]],
+        control: Control,
     ) -> None:
-        self._plan, self._blocks, self._block_of = plan, blocks, block_of
+        self._plan, self._blocks, self._taken, self._block_of = plan, blocks, taken, block_of
         missing = (block for block in control.watched(range(plan.blocks)) if not blocks.has(block))
         self._unfinished = {block: blocks.kept(block) for block in missing}
         self.sweeps = [
@@ -276,8 +313,9 @@ class _Rows:
     def put(self, entries: Entries) -> None:
         """Store the finite distances of some sweeps."""
         complete = {}
+        found = self._taken(entries)
         with self._lock:
-            for sweep, row in rows_of(entries).items():
+            for sweep, row in found.items():
                 block = sweep // self._plan.block_rows
                 rows = self._unfinished[block]
                 rows[sweep] = row

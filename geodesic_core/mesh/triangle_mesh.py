@@ -1,5 +1,6 @@
 """Triangle meshes: validated, frozen, with their topology."""
 
+import hashlib
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
@@ -510,6 +511,14 @@ class TriangleMesh:
         """The arrays that it was made from, but for barriers: what identifies it."""
         given = (self.vertices, self.faces)
         return given if self.lengths is None else (*given, self.lengths)
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of what it was made from and of its barriers, hexadecimal."""
+        digest = hashlib.sha256()
+        for array in (*self.defining_arrays, self.barriers):
+            digest.update(np.ascontiguousarray(array).data.cast("B") if array.size else b"-")
+        return digest.hexdigest()
 
     @cached_property
     def has_positions(self) -> bool:

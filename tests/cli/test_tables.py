@@ -1,6 +1,7 @@
 """The command that writes matrices of any size."""
 
 import errno
+import hashlib
 import json
 import os
 from pathlib import Path
@@ -47,6 +48,23 @@ def test_points_of_files_are_those_of_the_library(run: Run, sphere: Path) -> Non
     assert table.nnz == np.isfinite(expected).sum()
     cells = table.toarray()
     np.testing.assert_allclose(cells, np.where(np.isfinite(expected), expected, 0.0), rtol=1e-6)
+
+
+def test_a_matrix_of_points_from_options_has_its_facts_beside_it(run: Run, sphere: Path) -> None:
+    ask = ["matrix", sphere, "--source", 3, "--source", "f40:0.2,0.3,0.5", "--target", 7]
+    ask += ["--barriers", "90-99"]
+    walled = gc.load_mesh(sphere).with_barriers(range(90, 100))
+    for name, more in (("dense.npy", []), ("sparse.npz", ["--layout", "sparse"])):
+        assert run(*ask, *more, "--out", name).code == 0
+        facts = json.loads(Path(f"{name}.json").read_text())
+        assert facts["sources"] == [3, {"face": 40, "barycentric": [0.2, 0.3, 0.5]}]
+        assert (facts["targets"], facts["shape"]) == ([7], [2, 1])
+        assert facts["barriers"] == list(range(90, 100))
+        assert (facts["mesh"], facts["method"]) == (walled.digest, "exact")
+        assert (facts["units"], facts["error_bound"]["value"]) == ("mesh units", 0.0)
+        assert facts["sha256"] == hashlib.sha256(Path(name).read_bytes()).hexdigest()
+    assert run(*ask, "--out", "d.csv").code == 0
+    assert not Path("d.csv.json").exists()
 
 
 def test_a_label_of_a_brain_is_a_barrier(run: Run, sphere: Path) -> None:

@@ -9,6 +9,7 @@ import pytest
 from tests.support.paths import ROOT
 
 PARTS = [
+    "brain",
     "compilation",
     "solvers",
     "matrices",

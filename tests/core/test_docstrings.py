@@ -15,13 +15,18 @@ import pytest
 import geodesic_core as gc
 
 CONTROLS = {"progress", "cancel", "deadline_s", "memory_limit"}
-PACKAGES = {"gc": gc, "gc.errors": gc.errors, "gc.samples": gc.samples}
+PACKAGES = {
+    "gc": gc,
+    "gc.brain": gc.brain,
+    "gc.errors": gc.errors,
+    "gc.samples": gc.samples,
+}
 
 
 def exported(package: Any) -> list[str]:
     """Return the names of a package's own functions and classes."""
-    if package is gc:
-        return [name for name in gc.__all__ if not inspect.ismodule(getattr(gc, name))]
+    if hasattr(package, "__all__"):
+        return [name for name in package.__all__ if not inspect.ismodule(getattr(package, name))]
     own = [name for name, thing in vars(package).items() if callable(thing) and name[0] != "_"]
     return [name for name in own if getattr(package, name).__module__ == package.__name__]
 
@@ -50,6 +55,7 @@ RECORDS = {
     "gc.MeshReport",
     "gc.SurfaceCurve",
 }
+RECORDS |= {f"gc.brain.{name}" for name in gc.brain.__all__ if name[0].isupper()}
 RECORDS |= {"gc.MatrixFile", "gc.Nearest", "gc.Sample", "gc.SearchStep", "gc.SweepStats"}
 RECORDS |= {
     "gc.Border",

@@ -20,6 +20,8 @@ EACH = [
     errors.NoTangentPlane("vertex 0 has no tangent plane", 3),
     errors.NoDirection("direction 2 is zero", 2),
     errors.NoLoop("every loop shrinks"),
+    errors.OtherSurface("there are 80 values", 80, 42),
+    errors.NoSuchLabel("the roi has no vertex"),
     errors.NotEmbedded("locate needs positions"),
     errors.NoPath("no path", "disconnected"),
     errors.Cancelled("cancelled with 0% done"),

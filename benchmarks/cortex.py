@@ -1,10 +1,10 @@
-"""Small discs and whole rows of a real cortex, beside Connectome Workbench."""
+"""Small discs, whole rows and parcels of a real cortex, beside Connectome Workbench."""
 
 import math
 import os
 import resource
 import shutil
-import subprocess
+import sys
 import tempfile
 from collections.abc import Callable
 from functools import partial
@@ -19,7 +19,7 @@ import numpy as np
 import geodesic_core as gc
 from benchmarks.inputs import Inputs
 from benchmarks.tables import Section, verdict
-from geodesic_core.arrays import Longs
+from geodesic_core.arrays import Floats, Longs
 
 brain: Any = nibabel  # of whose types little is declared
 
@@ -29,6 +29,8 @@ SURFACE, THICKNESS = "white_right.gii.gz", "thick_right.gii.gz"
 """Of fsaverage5, which comes with nilearn"""
 RADII = {0.5: "", 10.0: "discs", 20.0: ""}
 """Millimetres"""
+GEODESIC = str(Path(sys.executable).with_name("geodesic"))
+PARCELS = 100
 ROWS = 200
 """Whole rows, of sources all over the surface"""
 METHODS: dict[str, dict[str, Any]] = {
@@ -54,17 +56,21 @@ def run(_inputs: Inputs, runs: int) -> Section:
         workbench = None if peer is None else _Workbench(Path(scratch), mesh, cortex)
         rows = [_discs(mesh, cortex, radius, workbench, runs) for radius in RADII]
         rows.append(_whole(mesh, cortex, workbench, runs))
+        if workbench is not None:
+            rows.append(_parcels(mesh, cortex, workbench))
     rows.append(_symmetric(mesh, cortex))
     return Section(
-        "Small discs",
+        "Cortex",
         f"Distances on the right white surface of fsaverage5 ({len(mesh.vertices):,} vertices) "
         f"between its {len(cortex):,} vertices of cortex, in one thread: all pairs within a radius "
         f"as a sparse matrix, {ROWS} whole rows, and all pairs beside as many rows of the full "
         "square; microseconds of processor time for each source, medians of "
-        f"{runs} by turns. Workbench writes a dense file within that time, and its distances are "
-        "a few per cent too long. The surface has so many sharp saddles that approximate sweeps "
-        "are exact ones.",
-        ["distances", "pairs a source", *METHODS, "Workbench"],
+        f"{runs} by turns. Workbench writes a dense file within that time. Its errors are the mean "
+        "and the largest one, as a share of the exact distance. Memory is the peak of a command: "
+        f"geodesic cortex, exact, and wb_command. Parcels are {PARCELS} of about the same area; "
+        "Workbench parcellates its matrix of all rows. The surface has so many sharp saddles that "
+        "approximate sweeps are exact ones.",
+        ["distances", "pairs a source", *METHODS, "Workbench", "its error", "MiB: ours, its"],
         rows,
     )
 
@@ -73,7 +79,7 @@ def _data() -> Path:
     """Return the folder of fsaverage5 in the package nilearn, which need not be imported."""
     spec = find_spec("nilearn")
     if spec is None or spec.origin is None:
-        raise SystemExit("discs: nilearn is not installed: run scripts/bench discs")
+        raise SystemExit("cortex: nilearn is not installed: run scripts/bench cortex")
     return Path(spec.origin).parent / "datasets" / "data" / "fsaverage5"
 
 
@@ -99,9 +105,17 @@ def _discs(
     if workbench is not None:
         calls["Workbench"] = partial(workbench.all_to_all, radius)
     seconds, results = _by_turns(calls, runs)
-    pairs = results["exact"].nnz / len(cortex)
-    limits = AT_MOST if RADII[radius] else {}
-    return [f"within {radius:g} mm", f"{pairs:.0f}", *_cells(seconds, len(cortex), limits)]
+    exact = results["exact"].tocoo()
+    cells = _cells(seconds, len(cortex), AT_MOST if RADII[radius] else {})
+    rest = ["", ""]
+    if workbench is not None:
+        theirs = workbench.matrix()[exact.row, exact.col]
+        is_known = (exact.data > 0.0) & (theirs >= 0.0)
+        rest = [
+            _error(theirs[is_known], exact.data[is_known]),
+            _memory(workbench.distances(radius), results["Workbench"]),
+        ]
+    return [f"within {radius:g} mm", f"{exact.nnz / len(cortex):.0f}", *cells, *rest]
 
 
 def _whole(
@@ -112,11 +126,54 @@ def _whole(
         name: partial(gc.distance_matrix, mesh, some, cortex, threads=1, **options)
         for name, options in METHODS.items()
     }
-    seconds, _ = _by_turns(calls, runs)
+    seconds, results = _by_turns(calls, runs)
+    rest = ["", ""]
     if workbench is not None:  # all rows, once
-        whole, _ = _by_turns({"Workbench": partial(workbench.all_to_all, math.inf)}, 1)
+        whole, peaks = _by_turns({"Workbench": partial(workbench.all_to_all, math.inf)}, 1)
         seconds |= {"Workbench": whole["Workbench"] * ROWS / len(cortex)}
-    return ["whole rows", f"{len(cortex):,}", *_cells(seconds, ROWS, {})]
+        exact = results["exact"]
+        theirs = workbench.matrix()[:: len(cortex) // ROWS][:ROWS]
+        is_known = exact > 0.0
+        rest = [_error(theirs[is_known], exact[is_known]), f"–, {peaks['Workbench']:,.0f}"]
+    return ["whole rows", f"{len(cortex):,}", *_cells(seconds, ROWS, {}), *rest]
+
+
+def _parcels(mesh: gc.TriangleMesh, cortex: Longs, workbench: "_Workbench") -> list[str]:
+    """Return the row of mean distances of parcels: a sweep of each vertex, once."""
+    region = gc.brain.load_cortex({"right": mesh}, cortex, "passes")
+    parcels = gc.brain.load_parcels(1 + gc.farthest_points(mesh, PARCELS).nearest, region)
+    gc.brain.write_labels(workbench.folder / "parcels.dlabel.nii", parcels)
+    calls: dict[str, Callable[[], Any]] = {
+        name: partial(
+            gc.brain.parcel_distances, parcels, workbench.folder / name, threads=1, **options
+        )
+        for name, options in METHODS.items()
+        if name != "approximate"
+    }
+    seconds, results = _by_turns(calls | {"Workbench": workbench.parcellate}, 1)
+    exact = results["exact"].mean
+    theirs = brain.load(workbench.folder / "mean.pconn.nii").get_fdata()
+    memory = _memory(workbench.parcels(), results["Workbench"])
+    cells = _cells(seconds | {"approximate": math.nan}, len(cortex), {})
+    return [
+        f"means of {len(parcels.names)} parcels",
+        f"{len(cortex):,}",
+        *cells,
+        _error(theirs, exact),
+        memory,
+    ]
+
+
+def _error(found: Floats, exact: Floats) -> str:
+    """Return the mean and the largest error of distances above 0, as a share of them."""
+    if not len(exact):
+        return ""
+    off = np.abs(found / exact - 1.0)
+    return f"{off.mean():.2%}, {off.max():.1%}"
+
+
+def _memory(ours: float, theirs: float) -> str:
+    return f"{ours:,.0f}, {theirs:,.0f}"
 
 
 def _symmetric(mesh: gc.TriangleMesh, cortex: Longs) -> list[str]:
@@ -156,6 +213,9 @@ def _cells(seconds: dict[str, float], sources: int, limits: dict[str, float]) ->
     peer = seconds.get("Workbench", math.nan)
     cells = []
     for name in METHODS:
+        if math.isnan(seconds[name]):
+            cells.append("")
+            continue
         cell = f"{1e6 * seconds[name] / sources:,.0f}"
         if not math.isnan(peer):
             cell += f" ({seconds[name] / peer:.2f} ×"
@@ -170,7 +230,7 @@ class _Workbench:
     """Connectome Workbench, whose surface and region are files."""
 
     def __init__(self, folder: Path, mesh: gc.TriangleMesh, cortex: Longs) -> None:
-        self._folder = folder
+        self.folder = folder
         inside = np.zeros(len(mesh.vertices), np.float32)
         inside[cortex] = 1.0
         self._save(
@@ -183,22 +243,56 @@ class _Workbench:
     def _save(self, name: str, *arrays: tuple[Any, str]) -> None:
         parts = [brain.gifti.GiftiDataArray(values, intent=intent) for values, intent in arrays]
         image = brain.gifti.GiftiImage(darrays=parts)
-        image.meta["AnatomicalStructurePrimary"] = "CortexRight"
-        brain.save(image, self._folder / name)
+        for table in (image.meta, parts[0].meta):
+            table["AnatomicalStructurePrimary"] = "CortexRight"
+        brain.save(image, self.folder / name)
 
-    def _run(self, *arguments: str) -> None:
-        subprocess.run(
-            [COMMAND, *arguments],
-            cwd=self._folder,
-            env=os.environ | {"OMP_NUM_THREADS": "1"},
-            check=True,
-            capture_output=True,
-        )
+    def _run(self, command: str, *arguments: str) -> float:
+        """Run a command, and return its peak of memory, MiB."""
+        outputs = [(os.POSIX_SPAWN_OPEN, fd, os.devnull, os.O_WRONLY, 0) for fd in (1, 2)]
+        environment = os.environ | {"OMP_NUM_THREADS": "1"}
+        call = [
+            command,
+            *(str(self.folder / a) if a[0].isalpha() and "." in a else a for a in arguments),
+        ]
+        child = os.posix_spawnp(command, call, environment, file_actions=outputs)
+        _, status, used = os.wait4(child, 0)
+        if status:
+            raise SystemExit(f"cortex: {' '.join(call)} failed")
+        return used.ru_maxrss / 1024.0
 
-    def all_to_all(self, radius: float) -> None:
-        """Write all distances within a radius, and -1 elsewhere, as a dense file."""
+    def matrix(self) -> Floats:
+        """Return the distances that were written last, -1 for those beyond a limit."""
+        values: Floats = np.asarray(brain.load(self.folder / "near.dconn.nii").dataobj)
+        return values
+
+    def distances(self, radius: float) -> float:
+        """Return the peak of memory of our command for the distances within a radius, MiB."""
+        limit = ["--limit", f"{radius:g}", "--out", "near.npz"]
+        return self._run(GEODESIC, "cortex", "distances", *self._region(), *limit)
+
+    def parcels(self) -> float:
+        """Return the peak of memory of our command for parcels, MiB: fast, as it is no less."""
+        wanted = ["--labels", "parcels.dlabel.nii", "--out", "by.command", "--method", "fast"]
+        return self._run(GEODESIC, "cortex", "parcels", *self._region(), *wanted)
+
+    def _region(self) -> list[str]:
+        return ["white.surf.gii", "--roi", "cortex.shape.gii", "--wall", "passes", "--threads", "1"]
+
+    def parcellate(self) -> float:
+        """Write the means of parcels, by the distances of all rows."""
+        peaks = [self.all_to_all(math.inf)]
+        names = "near.dconn.nii", "parcels.dlabel.nii"
+        peaks.append(self._run(COMMAND, "-cifti-parcellate", *names, "COLUMN", "half.pdconn.nii"))
+        names = "half.pdconn.nii", "parcels.dlabel.nii"
+        peaks.append(self._run(COMMAND, "-cifti-parcellate", *names, "ROW", "mean.pconn.nii"))
+        return max(peaks)
+
+    def all_to_all(self, radius: float) -> float:
+        """Write all distances within a radius, and -1 elsewhere; return the peak, MiB."""
         limit = [] if math.isinf(radius) else ["-limit", f"{radius:g}"]
-        self._run(
+        return self._run(
+            COMMAND,
             "-surface-geodesic-distance-all-to-all",
             "white.surf.gii",
             "near.dconn.nii",
