@@ -14,6 +14,7 @@ PARTS = [
     "matrices",
     "sampling",
     "loops",
+    "costs",
     "cutting",
     "search",
     "fields",
@@ -36,6 +37,7 @@ KERNELS = [
 MODULES = {f"geodesic_core.{part}": part for part in PARTS}
 MODULES |= {f"geodesic_core.kernels.{room}": room for room in KERNELS}
 MODULES |= {
+    "geodesic_core.kernels.costs": "cost_graph",
     "geodesic_core.kernels.cutting": "triangulations",
     "geodesic_core.kernels.mesh": "half_edges",
 }

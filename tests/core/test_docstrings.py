@@ -55,6 +55,8 @@ RECORDS |= {
     "gc.Border",
     "gc.Cells",
     "gc.Certificate",
+    "gc.CheapestPath",
+    "gc.CostField",
     "gc.CutMesh",
     "gc.FarthestPoints",
     "gc.MeanPoint",
