@@ -22,7 +22,7 @@ from geodesic_core.kernels.mesh.half_edges import (
 from geodesic_core.mesh.canonical import half_edges_around
 from geodesic_core.mesh.edge_lengths import flat_points
 
-_AT_VERTEX = 1e-9
+_AT_VERTEX = 1e-6
 """Share of an edge from its end where a crossing counts as at the vertex"""
 _ENOUGH = 1e-9
 """Share of the cost by which a round must lower it to be followed by another"""

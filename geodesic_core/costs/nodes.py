@@ -19,7 +19,7 @@ def graph_of(mesh: TriangleMesh, per_edge: int, costs: SurfaceCosts) -> Graph:
     lengths = topology.geometry[half_edge, LENGTH]
     mean = lengths.mean() if len(lengths) else 1.0
     counts = np.rint((per_edge + 1) * lengths / mean - 1.0)
-    counts = np.clip(counts, 1, _MOST * per_edge).astype(np.int32)
+    counts = np.clip(counts, max(per_edge // 2, 1), _MOST * per_edge).astype(np.int32)
     first = np.empty(len(half_edge) + 1, np.int32)
     first[0] = vertices
     np.cumsum(counts, out=first[1:])

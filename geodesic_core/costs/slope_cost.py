@@ -150,11 +150,10 @@ class SlopeCost:
         upward["xyz".index(self.up[1])] = 1.0 if self.up[0] == "+" else -1.0
         return upward
 
-    def closes(self, steepest: Floats) -> Any:
-        """Tell which faces are closed, by the slope of each straight up."""
-        if self.zigzag:
-            return np.zeros(len(steepest), bool)
-        return (steepest > self._high) | (steepest > -self._low)
+    @property
+    def limits(self) -> tuple[float, float]:
+        """The slopes below and above which costs are infinite, but for zig-zag."""
+        return self._low, self._high
 
 
 def step_costs(rule: Rule, square: Floats, rise: Floats) -> Floats:

@@ -51,7 +51,8 @@ class SurfaceCosts:
         mesh.require_embedded("a cost by slope")
         heights = mesh.positions @ by_slope.direction
         if not by_slope.zigzag:
-            inner[by_slope.closes(_steepest(mesh, heights))] = np.inf
+            steepest, (low, high) = _steepest(mesh, heights), by_slope.limits
+            inner[(steepest > high) | (steepest > -low)] = np.inf
         return cls(inner, heights, by_slope.rule, by_slope.direction, by_slope.least_by_length)
 
     @property

@@ -1,4 +1,4 @@
-"""What a step inside a face costs, by its length and its rise.
+"""Costs of steps inside a face, by their lengths and their rises.
 
 Where slopes cost, a step that goes ``run`` along the map and ``rise`` up costs ``run * c(slope)``,
 with ``slope = rise / run``. The rule c is convex and linear between its knots: on one piece the

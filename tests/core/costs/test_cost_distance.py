@@ -238,7 +238,8 @@ def test_calls_are_watched_and_stopped() -> None:
     cost = np.ones(len(mesh.faces))
     shares: list[float] = []
     gc.cost_distance(mesh, 0, cost, detail="fine", progress=shares.append)
-    assert shares == sorted(shares) and shares[-1] == 1.0
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
     with pytest.raises(gc.errors.Cancelled):
         gc.cost_distance(mesh, 0, cost, cancel=lambda: True)
     with pytest.raises(gc.errors.DeadlineExceeded):

@@ -68,9 +68,8 @@ def test_a_limit_of_slope_is_found() -> None:
     rule = gc.SlopeCost(lambda slope: 1.0 if abs(slope) <= limit else math.inf)
     assert float(rule.at(limit)) == pytest.approx(1.0, rel=1e-6)
     assert float(rule.at(2.0 * limit)) == pytest.approx(2.0, rel=1e-6)
-    closes = gc.SlopeCost(lambda s: 1.0 if abs(s) <= limit else math.inf, zigzag=False).closes
-    assert closes(np.array([0.9 * limit, 1.1 * limit])).tolist() == [False, True]
-    assert not rule.closes(np.array([9.0])).any()
+    assert rule.limits == pytest.approx((-limit, limit), rel=1e-8)
+    assert gc.SlopeCost("tobler").limits == (-math.inf, math.inf)
 
 
 def test_up_is_any_axis() -> None:
