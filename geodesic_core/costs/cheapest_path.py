@@ -12,6 +12,7 @@ from geodesic_core.costs.cost_sweep import (
     CostSweep,
     Detail,
     goal_of,
+    nodes_on_edge,
     starts_of,
     sweep_costs,
 )
@@ -183,7 +184,8 @@ def find_cheapest_path(
         message = f"{source} and {target} are in different connected components"
         raise disconnected(mesh, message, source, target)
     starts, goal = starts_of(mesh, costs, [(source,)], [0.0]), goal_of(mesh, costs, target)
-    sweep = sweep_costs(mesh, costs, starts, detail, limit * _BEYOND, control, goal)
+    per_edge = nodes_on_edge(costs, detail)
+    sweep = sweep_costs(mesh, costs, starts, per_edge, limit * _BEYOND, control, goal)
     path = path_to(sweep, target, control)
     if path is None and limit == np.inf:
         raise NoPath(f"faces of infinite cost lie between {source} and {target}", "disconnected")

@@ -11,7 +11,7 @@ from numpy.typing import DTypeLike, NDArray
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.costs.cheapest_path import CheapestPath, crossings_to, path_to
-from geodesic_core.costs.cost_sweep import CostSweep, Detail, starts_of, sweep_costs
+from geodesic_core.costs.cost_sweep import CostSweep, Detail, nodes_on_edge, starts_of, sweep_costs
 from geodesic_core.costs.crossings import cost_of, straightened
 from geodesic_core.costs.surface_costs import SurfaceCosts
 from geodesic_core.errors import NoPath
@@ -291,7 +291,7 @@ def find_costs(
     """
     costs = costs.turned() if direction == "to" else costs
     starts = starts_of(mesh, costs, lines, [source.start_distance for source in sources])
-    sweep = sweep_costs(mesh, costs, starts, detail, limit, control)
+    sweep = sweep_costs(mesh, costs, starts, nodes_on_edge(costs, detail), limit, control)
     control.finish()
     inner = mesh.topology.inner_vertex
     values = np.where(sweep.values <= limit, sweep.values, np.inf)

@@ -140,11 +140,16 @@ class CostSweep:
         return self.costs.of_steps(faces, (apart * apart).sum(axis=1), rises)
 
 
+def nodes_on_edge(costs: SurfaceCosts, detail: Detail) -> int:
+    """Return the number of nodes on an edge of mean length that a detail stands for."""
+    return (PER_EDGE if costs.is_symmetric else PER_EDGE_BY_SLOPE)[detail]
+
+
 def sweep_costs(
     mesh: TriangleMesh,
     costs: SurfaceCosts,
     starts: Starts,
-    detail: Detail,
+    per_edge: int,
     limit: float,
     control: Control,
     goal: Goal = NO_GOAL,
@@ -156,8 +161,7 @@ def sweep_costs(
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As the control says.
     """
-    per_edge = PER_EDGE if costs.is_symmetric else PER_EDGE_BY_SLOPE
-    graph = graph_of(mesh, per_edge[detail], costs)
+    graph = graph_of(mesh, per_edge, costs)
     count = int(graph.first_node[-1])
     control.check_memory(_BYTES_A_NODE * count)
     control.checkpoint(0.0)

@@ -17,7 +17,6 @@ from geodesic_core.kernels.mesh.half_edges import (
     SEAM,
     TAIL,
     Topology,
-    previous,
 )
 from geodesic_core.mesh.canonical import half_edges_around
 from geodesic_core.mesh.edge_lengths import flat_points
@@ -296,7 +295,9 @@ def _around(
     faces = [h // 3 for h in fan]
     k, around = faces.index(start), []
     while faces[k] != end:
-        h = previous(fan[k]) if left else fan[k]
+        h = fan[k]
+        if left:  # the edge before it in its face, which ends at the vertex
+            h += 2 if h % 3 == 0 else -1
         k += 1 if left else -1
         if not 0 <= k < len(fan):
             if topology.flags[v] & BOUNDARY:
