@@ -16,6 +16,9 @@ Examples
 from geodesic_core import brain, errors, samples
 from geodesic_core.compilation import compile_kernels, warm_up
 from geodesic_core.control import Control
+from geodesic_core.costs.cheapest_path import CheapestPath
+from geodesic_core.costs.cost_field import CostField
+from geodesic_core.costs.slope_cost import SlopeCost
 from geodesic_core.cutting.cut_mesh import CutMesh
 from geodesic_core.errors import GeodesicError
 from geodesic_core.fields.borders import Border
@@ -48,6 +51,8 @@ from geodesic_core.search.nearest import Nearest
 from geodesic_core.solvers import (
     Solver,
     approximate_distance,
+    cheapest_path,
+    cost_distance,
     cut,
     distance_matrix,
     error_bound,
@@ -73,7 +78,9 @@ __all__ = [
     "Border",
     "Cells",
     "Certificate",
+    "CheapestPath",
     "Control",
+    "CostField",
     "Curve",
     "CutMesh",
     "DistanceField",
@@ -93,6 +100,7 @@ __all__ = [
     "Sample",
     "ScalarField",
     "SearchStep",
+    "SlopeCost",
     "Solver",
     "Source",
     "StraightLine",
@@ -104,7 +112,9 @@ __all__ = [
     "approximate_distance",
     "as_mesh",
     "brain",
+    "cheapest_path",
     "compile_kernels",
+    "cost_distance",
     "cut",
     "distance_matrix",
     "error_bound",

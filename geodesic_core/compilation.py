@@ -25,6 +25,7 @@ from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.solvers import (
     Solver,
     approximate_distance,
+    cost_distance,
     cut,
     distance_matrix,
     exact_distance,
@@ -123,6 +124,11 @@ def _loops() -> None:
     handle_loops(samples.knot(500))
 
 
+def _costs() -> None:
+    mesh = _mesh()
+    cost_distance(mesh, 0, np.ones(len(mesh.faces))).path_to(8)
+
+
 def _samples() -> None:
     farthest_points(_mesh(), 2)
 
@@ -145,6 +151,7 @@ WORKLOADS: dict[str, Callable[[], None]] = {
     "cuts": _cuts,
     "loops": _loops,
     "certificates": _certificates,
+    "costs": _costs,
     "samples": _samples,
 }
 """Calls that together use all kernels, in an order that suits two processes.
@@ -164,7 +171,7 @@ def compile_kernels(
     workloads
         Kinds of calls to compile for: ``"exact"``, ``"approximate"``, ``"paths"``, ``"curves"``,
         ``"approximate-curves"``, ``"fast"``, ``"fast-curves"``, ``"isolines"``, ``"borders"``,
-        ``"maps"``, ``"cuts"``, ``"loops"``, ``"certificates"`` and ``"samples"``;
+        ``"maps"``, ``"cuts"``, ``"loops"``, ``"certificates"``, ``"costs"`` and ``"samples"``;
         None for all.
     cancel
         Called before compilation begins and then ten times a second; compilation ends once it

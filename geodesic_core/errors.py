@@ -325,7 +325,7 @@ class NoPath(GeodesicError):  # noqa: N818
     message
         The points, and the limit.
     reason
-        ``"disconnected"`` or ``"beyond_max_distance"``.
+        ``"disconnected"``, ``"beyond_max_distance"`` or ``"beyond_max_cost"``.
 
     Examples
     --------

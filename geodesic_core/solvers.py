@@ -10,12 +10,16 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
 from geodesic_core.arrays import Floats
 from geodesic_core.control import Control
+from geodesic_core.costs.cheapest_path import CheapestPath, find_cheapest_path
+from geodesic_core.costs.cost_field import CostField, Direction, find_costs
+from geodesic_core.costs.cost_sweep import Detail
+from geodesic_core.costs.surface_costs import Cost, SurfaceCosts
 from geodesic_core.cutting.cut import cut_along
 from geodesic_core.cutting.cut_mesh import CutMesh
 from geodesic_core.cutting.lines import as_line
@@ -25,7 +29,7 @@ from geodesic_core.fields.log_map import LogMap, log_map_of
 from geodesic_core.fields.methods import Effort, Method, as_effort, promise_of, sweep_of
 from geodesic_core.fields.path import ErrorBound, GeodesicPath, joined
 from geodesic_core.fields.question import Question
-from geodesic_core.fields.sources import as_points, component_of, disconnected
+from geodesic_core.fields.sources import as_points, as_sources, component_of, disconnected
 from geodesic_core.fields.straight_lines import (
     StraightLine,
     as_lengths,
@@ -55,6 +59,7 @@ from geodesic_core.search.path_search import PathSearch
 from geodesic_core.search.workspace import Workspace
 from geodesic_core.tolerances import AT_LIMIT
 from geodesic_core.validation import (
+    as_barriers,
     as_limit,
     as_nonnegative,
     check_choice,
@@ -1279,6 +1284,164 @@ def paths_around(
     return paths
 
 
+def cost_distance(
+    mesh: MeshLike | Solver,
+    sources: Sources,
+    cost: Cost,
+    max_cost: float | None = None,
+    barriers: Iterable[int] = (),
+    *,
+    direction: Direction = "from",
+    detail: Detail = "default",
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> CostField:
+    """Return what it costs to get from the nearest source to every vertex, where ways cost.
+
+    The cost of a path is the sum of its lengths in faces, each times the cost of the face; or times
+    a cost by slope in the direction of travel; or both. Each value is that of a path over the
+    surface, so never below the cheapest, and a little above it.
+
+    Parameters
+    ----------
+    mesh
+        The surface: a `TriangleMesh`, anything else that `as_mesh` takes, or a `Solver`.
+    sources
+        As in `exact_distance`; a `Source` starts at a cost, which is added.
+    cost
+        (F,) what a unit of length costs in each face, above 0; infinite where no path may go. Or a
+        `SlopeCost`. Or a pair of both, whose product counts. Along an edge that of its cheaper face
+        counts.
+    max_cost
+        Limit of the sweep; None for no limit. Vertices beyond it count as unreachable.
+    barriers
+        Ids of faces where no path may go either.
+    direction
+        ``"from"`` the sources, or ``"to"`` them: with costs by slope these differ.
+    detail
+        ``"default"``, or ``"fine"``: twice the time, a third of the error.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
+
+    Returns
+    -------
+    CostField
+        Costs, (V,) float64, with paths, and an estimate of their error.
+
+    Raises
+    ------
+    InvalidPoint
+        A source is not on the mesh, or in no face that a path may enter.
+    InvalidArgument
+        A cost is 0, negative or NaN, or another argument is out of its domain.
+    NotEmbedded
+        Slopes count, and the mesh has lengths alone.
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `exact_distance`.
+
+    Notes
+    -----
+    O(F log F): Dijkstra's search over the vertices and over points on the edges, with each path
+    bent by Snell's law behind the last edge. Two to three exact sweeps by default. Where costs are
+    equal everywhere, `exact_distance` is exact, and faster.
+
+    Examples
+    --------
+    >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
+    >>> gc.cost_distance(mesh, 0, [1.0, 3.0]).costs.round(3).tolist()
+    [0.0, 1.0, 2.707, 1.414]
+    >>> hill = gc.TriangleMesh([[0, 0, 0], [1, 0, 0.1], [0, 1, 0]], [[0, 1, 2]])
+    >>> walk = gc.SlopeCost("tobler")
+    >>> round(float(gc.cost_distance(hill, 0, walk)[1]), 2)  # seconds, up
+    1.01
+    >>> round(float(gc.cost_distance(hill, 0, walk, direction="to")[1]), 2)  # down
+    0.71
+    """
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    surface, costs = _costs_of(mesh, cost, barriers)
+    limit = as_limit(max_cost, "max_cost")
+    check_choice("direction", direction, get_args(Direction))
+    check_choice("detail", detail, get_args(Detail))
+    given, lines = as_sources(surface, sources, control)
+    return find_costs(surface, costs, given, lines, limit, direction, detail, control)
+
+
+def cheapest_path(
+    mesh: MeshLike | Solver,
+    source: Point,
+    target: Point,
+    cost: Cost,
+    max_cost: float | None = None,
+    *,
+    barriers: Iterable[int] = (),
+    detail: Detail = "default",
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> CheapestPath:
+    """Return the cheapest path from one point of the surface to another, where ways cost.
+
+    It bends where costs change, as light does by Snell's law, runs along roads, and goes around
+    what is closed.
+
+    Parameters
+    ----------
+    mesh
+        The surface: a `TriangleMesh`, anything else that `as_mesh` takes, or a `Solver`.
+    source, target
+        Vertex indices or `SurfacePoint`.
+    cost
+        As in `cost_distance`.
+    max_cost
+        What the path may cost at most; None for no limit.
+    barriers
+        Ids of faces where no path may go either.
+    detail
+        ``"default"``, or ``"fine"``: twice the time, a tenth of the error. Straightening leaves
+        little of either where costs are by face.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
+
+    Returns
+    -------
+    CheapestPath
+        Its points, its length, its cost, and an estimate of by how much another path may be
+        cheaper. With costs by slope the way back may run elsewhere: ask for it.
+
+    Raises
+    ------
+    NoPath
+        The points are not connected, or the path costs more than ``max_cost``.
+    InvalidPoint, InvalidArgument, NotEmbedded
+        As in `cost_distance`.
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `exact_distance`.
+
+    Notes
+    -----
+    A sweep as that of `cost_distance`, directed to the target; then the crossings of edges are
+    moved to where the path is cheapest, by Newton's method.
+
+    Examples
+    --------
+    >>> mesh = gc.samples.plane(2)
+    >>> path = gc.cheapest_path(mesh, 1, 2, [1.0, 2.0])
+    >>> path.points.round(3).tolist(), round(path.cost, 3)
+    ([[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, 1.0, 0.0]], 2.121)
+    """
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    surface, costs = _costs_of(mesh, cost, barriers)
+    limit = as_limit(max_cost, "max_cost")
+    check_choice("detail", detail, get_args(Detail))
+    ends = surface.point(source, "source"), surface.point(target, "target")
+    path = find_cheapest_path(surface, costs, *ends, detail, limit, control)
+    control.finish()
+    return path
+
+
 class Solver:
     """Solvers of one mesh that reuse memory and landmarks from call to call.
 
@@ -1337,6 +1500,8 @@ class Solver:
     shortest_loop = shortest_loop
     handle_loops = handle_loops
     paths_around = paths_around
+    cost_distance = cost_distance
+    cheapest_path = cheapest_path
 
 
 def _surface_of(
@@ -1345,6 +1510,14 @@ def _surface_of(
     """Return the mesh of a call with its barriers, and a control that counts their memory."""
     surface = mesh.mesh if isinstance(mesh, Solver) else as_mesh(mesh)
     return with_barriers(surface, barriers, control)
+
+
+def _costs_of(
+    mesh: MeshLike | Solver, cost: Cost, barriers: Iterable[int]
+) -> tuple[TriangleMesh, SurfaceCosts]:
+    """Return the mesh of a call and its costs, with infinite ones at its barriers."""
+    surface = mesh.mesh if isinstance(mesh, Solver) else as_mesh(mesh)
+    return surface, SurfaceCosts.of(surface, cost, as_barriers(barriers, len(surface.faces)))
 
 
 def _workspace_of(

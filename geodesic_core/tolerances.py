@@ -447,3 +447,15 @@ CERTIFIED = 1e-8
 
 Bounds of exact fields miss them by 1e-12 to 1e-9, most of which is rounding in the proof.
 """
+
+SLOPE_SAMPLING = 1e-6
+"""Share of a cost by slope by which lines between its samples may be off.
+
+A thousandth of what the graph of a cost sweep is off by. Tobler's rule takes a thousand samples.
+"""
+
+CONVEX = 2e-6
+"""Share by which a cost by slope may exceed that of mixtures of other slopes: sampling.
+
+Where it exceeds them by more, paths would zig-zag at as small a scale as they may.
+"""

@@ -114,19 +114,19 @@ def as_nonnegative(name: str, values: ArrayLike, count: int) -> Floats:
     return given
 
 
-def as_limit(max_distance: float | None) -> float:
-    """Return a distance, infinite for None.
+def as_limit(limit: float | None, name: str = "max_distance") -> float:
+    """Return a limit, infinite for None; ``name`` is the argument's.
 
     Raises
     ------
     InvalidArgument
         It is not a number, 0 or more.
     """
-    if max_distance is None:
+    if limit is None:
         return math.inf
-    if not is_number(max_distance) or not max_distance >= 0.0:
-        raise InvalidArgument(f"max_distance is {max_distance!r}; it must be a number, 0 or more")
-    return float(max_distance)
+    if not is_number(limit) or not limit >= 0.0:
+        raise InvalidArgument(f"{name} is {limit!r}; it must be a number, 0 or more")
+    return float(limit)
 
 
 def check_choice(name: str, value: Any, choices: Sequence[str]) -> None:

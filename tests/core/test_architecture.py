@@ -15,6 +15,7 @@ PARTS = [
     "matrices",
     "sampling",
     "loops",
+    "costs",
     "cutting",
     "search",
     "fields",
@@ -37,6 +38,7 @@ KERNELS = [
 MODULES = {f"geodesic_core.{part}": part for part in PARTS}
 MODULES |= {f"geodesic_core.kernels.{room}": room for room in KERNELS}
 MODULES |= {
+    "geodesic_core.kernels.costs": "cost_graph",
     "geodesic_core.kernels.cutting": "triangulations",
     "geodesic_core.kernels.mesh": "half_edges",
 }

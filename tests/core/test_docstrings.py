@@ -61,6 +61,8 @@ RECORDS |= {
     "gc.Border",
     "gc.Cells",
     "gc.Certificate",
+    "gc.CheapestPath",
+    "gc.CostField",
     "gc.CutMesh",
     "gc.FarthestPoints",
     "gc.MeanPoint",

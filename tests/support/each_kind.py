@@ -77,6 +77,8 @@ QUESTIONS: dict[str, Callable[[], object]] = {
     "level sets": lambda: gc.ScalarField(MESH, MESH.vertices[:, 2]).isolines([0.0]),
     "boundaries": lambda: MESH.boundaries,
     "cut": lambda: gc.cut(MESH, [CURVE, gc.shortest_path(MESH, 0, LAST)]).mesh,
+    "costs": lambda: gc.cost_distance(MESH, CURVE, 1.0).path_to(POINT),
+    "costs by slope": lambda: gc.cheapest_path(MESH, POINT, LAST, gc.SlopeCost("tobler")),
     "limit": lambda: gc.exact_distance(MESH, 0, max_distance=0.3),
     "matrix": lambda: gc.distance_matrix(MESH, [0, POINT], [LAST]),
     "nearest": lambda: gc.nearest(MESH, 0, [5, LAST], k=2),
