@@ -2,10 +2,13 @@
 
 import math
 import os
+import re
 import resource
 import shutil
+import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from functools import partial
 from importlib.util import find_spec
@@ -31,6 +34,8 @@ RADII = {0.5: "", 10.0: "discs", 20.0: ""}
 """Millimetres"""
 GEODESIC = str(Path(sys.executable).with_name("geodesic"))
 PARCELS = 100
+PERIOD_S = 0.02
+"""Between two looks at the memory of a command"""
 ROWS = 200
 """Whole rows, of sources all over the surface"""
 METHODS: dict[str, dict[str, Any]] = {
@@ -172,6 +177,19 @@ def _error(found: Floats, exact: Floats) -> str:
     return f"{off.mean():.2%}, {off.max():.1%}"
 
 
+def _peak_mib(pid: int) -> float:
+    """Return the most memory that a process has held so far; 0 where it has ended.
+
+    That of resource usage counts what its parent held when it was started.
+    """
+    try:
+        text = Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return 0.0
+    found = re.search(r"VmHWM:\s*(\d+) kB", text)
+    return float(found[1]) / 1024.0 if found else 0.0
+
+
 def _memory(ours: float, theirs: float) -> str:
     return f"{ours:,.0f}, {theirs:,.0f}"
 
@@ -249,17 +267,20 @@ class _Workbench:
 
     def _run(self, command: str, *arguments: str) -> float:
         """Run a command, and return its peak of memory, MiB."""
-        outputs = [(os.POSIX_SPAWN_OPEN, fd, os.devnull, os.O_WRONLY, 0) for fd in (1, 2)]
-        environment = os.environ | {"OMP_NUM_THREADS": "1"}
         call = [
             command,
             *(str(self.folder / a) if a[0].isalpha() and "." in a else a for a in arguments),
         ]
-        child = os.posix_spawnp(command, call, environment, file_actions=outputs)
-        _, status, used = os.wait4(child, 0)
-        if status:
+        environment = os.environ | {"OMP_NUM_THREADS": "1"}
+        nowhere = subprocess.DEVNULL
+        child = subprocess.Popen(call, env=environment, stdout=nowhere, stderr=nowhere)
+        peak = 0.0
+        while child.poll() is None:
+            peak = max(peak, _peak_mib(child.pid))
+            time.sleep(PERIOD_S)
+        if child.returncode:
             raise SystemExit(f"cortex: {' '.join(call)} failed")
-        return used.ru_maxrss / 1024.0
+        return peak
 
     def matrix(self) -> Floats:
         """Return the distances that were written last, -1 for those beyond a limit."""

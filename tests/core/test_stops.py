@@ -15,7 +15,7 @@ from geodesic_core import control
 from geodesic_core.cutting import retriangulation
 from geodesic_core.errors import Cancelled, DeadlineExceeded, InvalidArgument, MemoryLimitExceeded
 from geodesic_core.fields import fast_sweep, straight_lines, sweep
-from geodesic_core.loops import straighten
+from geodesic_core.fields import straighten
 from tests.support import zoo
 from tests.support.searches import answer, landmark_count
 
