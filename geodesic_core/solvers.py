@@ -1344,8 +1344,8 @@ def cost_distance(
     Notes
     -----
     O(F log F): Dijkstra's search over the vertices and over points on the edges, with each path
-    bent by Snell's law behind the last edge. Two to three exact sweeps by default. Where costs are
-    equal everywhere, `exact_distance` is exact, and faster.
+    bent by Snell's law behind the last edge. Two to three exact sweeps by default, up to six where
+    slopes count. Where costs are equal everywhere, `exact_distance` is exact, and faster.
 
     Examples
     --------

@@ -78,6 +78,8 @@ SWEEPS |= {
     "farthest points": lambda m, **watch: gc.farthest_points(m, 60, **watch).distances,
     "relaxed": lambda m, **watch: gc.relax_points(m, [INSIDE, 5, 900], 3, **watch).costs,
     "mean": lambda m, **watch: gc.mean_point(m, [INSIDE, 5, 900], **watch),
+    "costs": lambda m, **watch: gc.cost_distance(m, 0, 1.0, detail="fine", **watch).costs,
+    "cheapest path": lambda m, **watch: gc.cheapest_path(m, 0, 5, 1.0, **watch).cost,
     "sides": lambda m, **watch: gc.paths_around(m, 0, 2000, 1000, **watch),
     "lines": lambda m, **watch: gc.trace(m, MANY, np.arange(10.0), 300.0, **watch),
 }

@@ -108,6 +108,7 @@ def test_steep_slopes_cost_what_the_zigzag_costs() -> None:
     assert up.cost / straight == pytest.approx(0.667, abs=5e-4)
 
 
+@pytest.mark.jit
 def test_the_way_back_costs_otherwise() -> None:
     mesh = gc.samples.terrain(2000)
     walk, n = gc.SlopeCost("tobler"), len(mesh.vertices) - 1
@@ -124,6 +125,7 @@ def test_the_way_back_costs_otherwise() -> None:
     assert alike.cost == pytest.approx(integrated(alike, one), rel=1e-12)
 
 
+@pytest.mark.jit
 def test_both_costs_multiply() -> None:
     mesh = gc.samples.terrain(500)
     factors = np.random.default_rng(2).choice([1.0, 3.0], len(mesh.faces))
@@ -155,6 +157,7 @@ def test_points_inside_faces_and_on_edges_are_ends() -> None:
         assert (path.cost, path.length, len(path.points)) == (0.0, 0.0, 1)
 
 
+@pytest.mark.jit
 def test_closed_faces_are_walked_around() -> None:
     """As by an exact search with barriers, within a thousandth."""
     mesh = gc.samples.obstacles(2000)

@@ -49,6 +49,7 @@ def least_of(kind: str) -> np.ndarray:
     return costs_from(BUMPY.vertices, BUMPY.faces, factors_of(kind), 9, step)
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("detail", ["default", "fine"])
 @pytest.mark.parametrize("kind", ["one", "mixed", "slope", "both"])
 def test_stated_errors_hold(kind: str, detail: str) -> None:
@@ -173,6 +174,19 @@ def test_lower_bounds_hold() -> None:
     )
 
 
+def test_paths_go_over_edges_of_three_faces() -> None:
+    """From one page of a book to another, past a third that costs more; the spine is a road."""
+    corners = [[0, 0, 0], [0, 4, 0], [1, 2, 0], [-1, 2, 0], [0, 2, 1]]
+    book = gc.TriangleMesh(corners, [[0, 1, 2], [0, 1, 3], [0, 1, 4]])
+    field = gc.cost_distance(book, 2, [1.0, 2.0, 0.1])
+    assert field.costs[3] == pytest.approx(3.0, rel=1e-3)
+    # Down to the spine at the angle of refraction, then along it
+    critical = math.sqrt(1.0 - 0.1**2)
+    assert -BELOW <= field.costs[0] / (critical + 0.2) - 1.0 <= 0.05
+    assert field.path_to(0).cost == pytest.approx(critical + 0.2, rel=1e-6)
+    assert field.path_to(4).cost == pytest.approx(1.1, rel=1e-9)
+
+
 def test_lengths_alone_suffice_for_costs_by_face() -> None:
     lengths = np.linalg.norm(
         np.roll(BUMPY.vertices[BUMPY.faces], -1, axis=1) - BUMPY.vertices[BUMPY.faces], axis=2
@@ -233,6 +247,7 @@ def test_other_arguments_are_refused() -> None:
             gc.cost_distance(BUMPY, 9, ONE, **options)
 
 
+@pytest.mark.jit
 def test_calls_are_watched_and_stopped() -> None:
     mesh = gc.samples.terrain(20_000)
     cost = np.ones(len(mesh.faces))
