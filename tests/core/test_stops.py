@@ -14,8 +14,7 @@ import geodesic_core as gc
 from geodesic_core import control
 from geodesic_core.cutting import retriangulation
 from geodesic_core.errors import Cancelled, DeadlineExceeded, InvalidArgument, MemoryLimitExceeded
-from geodesic_core.fields import fast_sweep, straight_lines, sweep
-from geodesic_core.fields import straighten
+from geodesic_core.fields import fast_sweep, straight_lines, straighten, sweep
 from tests.support import zoo
 from tests.support.searches import answer, landmark_count
 
