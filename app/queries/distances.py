@@ -19,6 +19,7 @@ from app.queries.accuracy import (
 )
 from app.queries.base import VALUES_OF_POINT, ExecutionContext
 from app.queries.cost_model import PER_FACE_CERTIFIED, PER_POINT, sweep_seconds
+from app.queries.costs import CHEAPEST, CostsAsDistances, check_alone, solve_costs, sweeps_of
 from app.queries.from_sources import FromSources
 from app.queries.points import (
     SurfacePoints,
@@ -54,6 +55,10 @@ class DistancesQuery(FromSources[DistancesRequest]):
         if "gradient" in request.include and request.targets is not None:
             message = "gradient covers all vertices; ask for it without targets"
             raise invalid_fields(["/include"], message)
+        if request.cost is not None:
+            check_alone(request, "certify")
+            if "gradient" in request.include:
+                raise invalid_fields(["/include"], "a gradient is one of distances, not of costs")
         if request.certify:
             _check_certifiable(request)
         elif proved := {*_BOUNDS, _VIOLATIONS} & set(request.include):
@@ -97,7 +102,9 @@ class DistancesQuery(FromSources[DistancesRequest]):
         request = self.request
         points = self.source_count + len(request.targets or ())
         proof = PER_FACE_CERTIFIED * self.size.faces if request.certify else 0.0
-        return sweep_seconds(self.size.faces, request, self.share) + PER_POINT * points + proof
+        sweeps = 1.0 if request.cost is None else sweeps_of(request.cost)
+        seconds = sweeps * sweep_seconds(self.size.faces, request, self.share)
+        return seconds + PER_POINT * points + proof
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep once, and prove what was found if asked for."""
@@ -111,35 +118,39 @@ class DistancesQuery(FromSources[DistancesRequest]):
             _check_vertices(targets or ())
         starts = to_sources(mesh, request.sources, sources)
         limit, parts = request.max_distance, 2 if request.certify else 1
-        field = solve_field(
-            opened,
-            request,
-            starts,
-            context.part(0, parts),
-            max_distance=limit,
-            targets=targets or (),
-        )
+        field: gc.DistanceField | CostsAsDistances
+        if request.cost is not None:
+            field = solve_costs(opened, request.cost, starts, context)
+        else:
+            field = solve_field(
+                opened,
+                request,
+                starts,
+                context.part(0, parts),
+                max_distance=limit,
+                targets=targets or (),
+            )
         certificate = None
-        if request.certify:
+        if isinstance(field, gc.DistanceField) and request.certify:
             field = copy(field)  # that of the cache keeps its bound, as others are answered by it
             certificate = field.certify(**context.part(1, parts).options)
         distances = _at(targets, field.distances, field.distance_at)
         members = self.members(
             opened,
-            method=request.method,
+            method=request.method if request.cost is None else CHEAPEST,
             error_bound=bound_of(field.error_bound),
             sources=[describe_source(mesh, start) for start in starts],
             **_described(mesh, targets),
             distances=distances,
             **(told(certificate, certificate.relative_gap) if certificate else {}),
             unreachable=_unreachable(mesh, sources, targets, distances),
-            stats=stats_of(field.stats),
+            stats={} if field.stats is None else stats_of(field.stats),
         )
         included: dict[str, Any] = {}
         if "nearest_source" in request.include:
             nearest = _at(targets, field.nearest_source, field.nearest_source_at)
             included["nearest_source"] = Indices(nearest)
-        if "gradient" in request.include:
+        if isinstance(field, gc.DistanceField) and "gradient" in request.include:
             included["gradient"] = field.gradient
         for name in _BOUNDS:
             if name in request.include:

@@ -12,12 +12,12 @@ SHOWN = "points", "locations", "faces"
 """The members that drawings and tables of a path show."""
 
 
-def outline_of(path: gc.GeodesicPath) -> dict[str, Any]:
+def outline_of(path: gc.GeodesicPath | gc.CheapestPath) -> dict[str, Any]:
     """Return the members of a path."""
     return {"status": "ok", **polyline_of(path), "error_bound": bound_of(path.error_bound)}
 
 
-def polyline_of(path: gc.GeodesicPath) -> dict[str, Any]:
+def polyline_of(path: gc.SurfaceCurve) -> dict[str, Any]:
     """Return the members of a path or a line as a polyline; its points only where it has any."""
     return {
         "length": path.length,

@@ -13,6 +13,7 @@ from app.queries import point_text
 from app.queries.accuracy import bound_of, options_of, solve_field, with_default_accuracy
 from app.queries.base import VALUES_OF_POINT, ExecutionContext, Query
 from app.queries.cost_model import PER_FACE_CERTIFIED, search_seconds, share_reached, sweep_seconds
+from app.queries.costs import CHEAPEST, ROUGHLY, check_alone, library_cost, refused_costs, sweeps_of
 from app.queries.outline import SHOWN, no_outline, outline_of
 from app.queries.points import SurfacePoints, describe_point, numbered
 from app.queries.proofs import check_proof_format, told
@@ -25,7 +26,7 @@ from app.queries.validation import (
 )
 from app.queries.views import line_of
 from app.schemas.points import Point
-from app.schemas.requests import EFFORT_OF_PATHS, PathParameters, PathRequest
+from app.schemas.requests import EFFORT_OF_PATHS, PathParameters, PathRequest, SurfaceCost
 from app.settings import Settings
 from app.store.meshes import OpenMesh
 
@@ -46,7 +47,11 @@ class PathQuery(Query[PathRequest]):
 
     @classmethod
     def normalized(cls, request: PathRequest) -> PathRequest:
-        """Name error or effort; refuse waypoints where the path is approximate, and some proofs."""
+        """Name error or effort; refuse what does not go together."""
+        if request.cost is not None:
+            check_alone(request, "certify", "waypoints")
+            if request.cost.direction != "from":
+                raise invalid_fields(["/cost/direction"], "a path has one: exchange its ends")
         if request.certify and request.method != "exact":
             raise invalid_fields(["/certify"], "goes with method 'exact' only")
         if request.certify and request.waypoints:
@@ -75,6 +80,8 @@ class PathQuery(Query[PathRequest]):
     def rough_seconds(self) -> float:
         """Return the cost of a search for each leg, or of a sweep."""
         request = self.request
+        if request.cost is not None:
+            return sweeps_of(request.cost) * sweep_seconds(self.size.faces, request, 1.0)
         if request.method == "approximate":
             share = share_reached(self.size, 1, request.max_distance)
             return sweep_seconds(self.size.faces, request, share)
@@ -89,6 +96,8 @@ class PathQuery(Query[PathRequest]):
             message = "one end must be a vertex: a certificate proves distances of vertices"
             raise invalid_fields(["/source", "/target"], message)
         searching = context.part(0, 2) if request.certify else context
+        if request.cost is not None:
+            return self._cheapest(opened, points, request.cost, context)
         try:
             if request.method == "approximate":
                 start = [gc.Source(source)]
@@ -122,11 +131,28 @@ class PathQuery(Query[PathRequest]):
         values = VALUES_OF_POINT * len(path.locations)
         return replace(answer, values=values, array=lambda: path.points, named=proof)
 
+    def _cheapest(
+        self, opened: OpenMesh, points: SurfacePoints, cost: SurfaceCost, context: ExecutionContext
+    ) -> Answer:
+        """Return the answer where ways cost."""
+        source, target = points
+        given = library_cost(cost)
+        try:
+            with refused_costs():
+                path = opened.solver.cheapest_path(
+                    source, target, given, cost.max_cost, detail=cost.detail, **context.options
+                )
+        except gc.errors.NoPath as error:
+            return self._answer(opened, points, no_outline(error.reason, ROUGHLY) | {"cost": None})
+        answer = self._answer(opened, points, {**outline_of(path), "cost": path.cost})
+        values = VALUES_OF_POINT * len(path.locations)
+        return replace(answer, values=values, array=lambda: path.points)
+
     def _answer(self, opened: OpenMesh, points: SurfacePoints, found: dict[str, Any]) -> Answer:
         source, target, *waypoints = (describe_point(opened.mesh, point) for point in points)
         members = self.members(
             opened,
-            method=self.request.method,
+            method=self.request.method if self.request.cost is None else CHEAPEST,
             source=source,
             target=target,
             waypoints=waypoints,

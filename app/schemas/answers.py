@@ -79,11 +79,11 @@ class Certificate(BaseModel):
 
 
 class DistancesAnswer(BaseModel):
-    """Distances in mesh units, ``null`` where unreachable."""
+    """Distances in mesh units, or costs, ``null`` where unreachable."""
 
     kind: Literal["distances"]
     mesh_id: str
-    method: Method
+    method: Method | Literal["cheapest"]
     error_bound: ErrorBound
     sources: list[ResolvedSource | ResolvedCurveSource]
     targets: list[ResolvedPoint] | None = Field(default=None, description="The targets, if given")
@@ -343,7 +343,7 @@ class Outline(BaseModel):
     """A path, or the reason why there is none."""
 
     status: Literal["ok", "no_path"]
-    reason: Literal["disconnected", "beyond_max_distance"] | None = None
+    reason: Literal["disconnected", "beyond_max_distance", "beyond_max_cost"] | None = None
     length: float | None = Field(description="The length in mesh units; null without a path")
     points: list[tuple[float, float, float]] | None = Field(
         description="Null without a path, and on a mesh that is given by the lengths of its edges "
@@ -365,7 +365,10 @@ class PathAnswer(Outline):
 
     kind: Literal["path"]
     mesh_id: str
-    method: Method
+    method: Method | Literal["cheapest"]
+    cost: float | None = Field(
+        default=None, description="With `cost`: what the path costs, which `error_bound` is about"
+    )
     source: ResolvedPoint
     target: ResolvedPoint
     waypoints: list[ResolvedPoint]

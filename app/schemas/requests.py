@@ -113,6 +113,45 @@ class AmongBarriers(QueryBody):
     )
 
 
+class SurfaceCost(StrictModel):
+    """What ways cost: by face, by slope, or by the product of both."""
+
+    faces: FailFastList[Positive | None] | None = Field(
+        default=None,
+        description="What a unit of length costs in each face, above 0; `null` where no path goes",
+    )
+    slope: Literal["tobler", "naismith"] | FailFastList[tuple[Number, Positive]] | None = Field(
+        default=None,
+        description="What a unit of length on the map costs by its slope in the direction of "
+        "travel: `tobler` and `naismith` are seconds a metre; or pairs of a slope, ascending, and "
+        "its cost, which must be convex",
+        examples=["tobler"],
+    )
+    up: Literal["+x", "-x", "+y", "-y", "+z", "-z"] = Field(
+        default="+z", description="For `slope`: the axis of heights"
+    )
+    zigzag: StrictBool = Field(
+        default=True,
+        description="For `slope`: whether slopes beyond the pairs are climbed in zig-zag; if not, "
+        "faces that are steeper are closed",
+    )
+    direction: Literal["from", "to"] = Field(
+        default="from", description="`to`: the costs of getting to the sources"
+    )
+    detail: Literal["default", "fine"] = Field(
+        default="default", description="`fine`: twice the time, a third of the error"
+    )
+    max_cost: NonNegative | None = Field(
+        default=None, description="Points that cost more count as unreachable"
+    )
+
+    @model_validator(mode="after")
+    def _says_what_costs(self) -> "SurfaceCost":
+        if self.faces is None and self.slope is None:
+            raise PydanticCustomError("cost", "Give the costs of faces, or a slope, or both")
+        return self
+
+
 class AskingForLines(AmongBarriers):
     """A query for lines on the surface."""
 
@@ -158,6 +197,11 @@ class DistancesRequest(AccuracyOrEffort, AmongBarriers):
         description="Also prove the distances of vertices, for `exact` and `approximate`, from "
         "sources that are points. It takes about fifteen times as long. The answer has a "
         "`certificate`, and as `npz` it is the file that `geodesic-verify` checks",
+    )
+    cost: SurfaceCost | None = Field(
+        default=None,
+        description="Find what the cheapest ways cost instead of how long the shortest are. "
+        "`distances` are costs then; what is about distances does not go with it",
     )
 
 
@@ -396,6 +440,11 @@ class PathRequest(AccuracyOrEffort, Stops):
         description="Also prove that no path is shorter, for `exact` without waypoints, where one "
         "end is a vertex. The answer has a `certificate`, and as `npz` it is the file that "
         "`geodesic-verify` checks, with the source; with the target if that is no vertex",
+    )
+    cost: SurfaceCost | None = Field(
+        default=None,
+        description="Find the cheapest path instead of the shortest. Goes without `waypoints`, and "
+        "without what is about distances",
     )
 
 

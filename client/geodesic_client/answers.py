@@ -108,9 +108,11 @@ class Path:
     """The points again, each as a face and the weights of its corners"""
     error_bound: ErrorBound
     reason: str | None
-    """``disconnected`` or ``beyond_max_distance``; None for a path"""
+    """``disconnected``, ``beyond_max_distance`` or ``beyond_max_cost``; None for a path"""
     certificate: Certificate | None = None
     """What the proof of its length tells; None if none was requested"""
+    cost: float | None = None
+    """What it costs, if ``cost`` was given"""
 
 
 @dataclass(frozen=True)
@@ -440,6 +442,7 @@ def _to_path(document: Mapping[str, Any]) -> Path:
         error_bound=ErrorBound(**document["error_bound"]),
         reason=document.get("reason"),
         certificate=_to_certificate(document),
+        cost=document.get("cost"),
     )
 
 

@@ -199,12 +199,14 @@ def distances(
     barriers: Sequence[int] = (),
     include: Sequence[Literal["nearest_source", "gradient", "lower", "upper", "violations"]] = (),
     certify: bool = False,
+    cost: Mapping[str, Any] | None = None,
     progress: Progress = ignore_progress,
 ) -> Flow[Distances]:
     """Return the distance of each vertex, or of each target, from the nearest source.
 
     ``sources`` is a point, or several. With ``certify`` the distances are proved; ``lower`` and
-    ``upper`` are bounds of each.
+    ``upper`` are bounds of each. With ``cost`` they are costs: ``{"slope": "tobler"}``, or
+    ``{"faces": [...]}`` with one for each face, for example.
     """
     body = _body(
         sources=as_points(sources),
@@ -217,6 +219,7 @@ def distances(
         barriers=barriers,
         include=include,
         certify=certify or None,  # older services do not know it
+        cost=cost,
     )
     media_type = JSON if len(include) else NPY
     return (yield from _ask(mesh, "distances", body, to_distances, progress, media_type))
@@ -235,11 +238,13 @@ def path(
     max_distance: float | None = None,
     barriers: Sequence[int] = (),
     certify: bool = False,
+    cost: Mapping[str, Any] | None = None,
     progress: Progress = ignore_progress,
 ) -> Flow[Path]:
     """Return the shortest path from source to target, past waypoints in their order.
 
-    With ``certify`` it is proved that no path is shorter.
+    With ``certify`` it is proved that no path is shorter. With ``cost``, as for `distances`, the
+    path is the cheapest.
     """
     body = _body(
         source=source,
@@ -252,6 +257,7 @@ def path(
         max_distance=max_distance,
         barriers=barriers,
         certify=certify or None,  # older services do not know it
+        cost=cost,
     )
     return (yield from _ask(mesh, "path", body, to_path, progress))
 

@@ -1144,7 +1144,7 @@ export interface components {
         };
         /**
          * DistancesAnswer
-         * @description Distances in mesh units, ``null`` where unreachable.
+         * @description Distances in mesh units, or costs, ``null`` where unreachable.
          */
         DistancesAnswer: {
             /**
@@ -1154,11 +1154,8 @@ export interface components {
             kind: "distances";
             /** Mesh Id */
             mesh_id: string;
-            /**
-             * Method
-             * @enum {string}
-             */
-            method: "exact" | "approximate" | "fast";
+            /** Method */
+            method: ("exact" | "approximate" | "fast") | "cheapest";
             error_bound: components["schemas"]["ErrorBound"];
             /** Sources */
             sources: (components["schemas"]["ResolvedSource"] | components["schemas"]["ResolvedCurveSource"])[];
@@ -1290,6 +1287,8 @@ export interface components {
              * @description Also prove the distances of vertices, for `exact` and `approximate`, from sources that are points. It takes about fifteen times as long. The answer has a `certificate`, and as `npz` it is the file that `geodesic-verify` checks. Default: `false`
              */
             certify?: boolean;
+            /** @description Find what the cheapest ways cost instead of how long the shortest are. `distances` are costs then; what is about distances does not go with it */
+            cost?: components["schemas"]["SurfaceCost"] | null;
         };
         /**
          * EdgePoint
@@ -2530,7 +2529,7 @@ export interface components {
              */
             status: "ok" | "no_path";
             /** Reason */
-            reason?: ("disconnected" | "beyond_max_distance") | null;
+            reason?: ("disconnected" | "beyond_max_distance" | "beyond_max_cost") | null;
             /**
              * Length
              * @description The length in mesh units; null without a path
@@ -2562,11 +2561,13 @@ export interface components {
             kind: "path";
             /** Mesh Id */
             mesh_id: string;
+            /** Method */
+            method: ("exact" | "approximate" | "fast") | "cheapest";
             /**
-             * Method
-             * @enum {string}
+             * Cost
+             * @description With `cost`: what the path costs, which `error_bound` is about
              */
-            method: "exact" | "approximate" | "fast";
+            cost?: number | null;
             source: components["schemas"]["ResolvedPoint"];
             target: components["schemas"]["ResolvedPoint"];
             /** Waypoints */
@@ -2649,6 +2650,8 @@ export interface components {
              * @description Also prove that no path is shorter, for `exact` without waypoints, where one end is a vertex. The answer has a `certificate`, and as `npz` it is the file that `geodesic-verify` checks, with the source; with the target if that is no vertex. Default: `false`
              */
             certify?: boolean;
+            /** @description Find the cheapest path instead of the shortest. Goes without `waypoints`, and without what is about distances */
+            cost?: components["schemas"]["SurfaceCost"] | null;
         };
         /**
          * PathTo
@@ -2661,7 +2664,7 @@ export interface components {
              */
             status: "ok" | "no_path";
             /** Reason */
-            reason?: ("disconnected" | "beyond_max_distance") | null;
+            reason?: ("disconnected" | "beyond_max_distance" | "beyond_max_cost") | null;
             /**
              * Length
              * @description The length in mesh units; null without a path
@@ -3217,6 +3220,54 @@ export interface components {
              * @description The face of each segment
              */
             faces: number[];
+        };
+        /**
+         * SurfaceCost
+         * @description What ways cost: by face, by slope, or by the product of both.
+         */
+        SurfaceCost: {
+            /**
+             * Faces
+             * @description What a unit of length costs in each face, above 0; `null` where no path goes
+             */
+            faces?: (number | null)[] | null;
+            /**
+             * Slope
+             * @description What a unit of length on the map costs by its slope in the direction of travel: `tobler` and `naismith` are seconds a metre; or pairs of a slope, ascending, and its cost, which must be convex
+             * @example tobler
+             */
+            slope?: ("tobler" | "naismith") | [
+                number,
+                number
+            ][] | null;
+            /**
+             * Up
+             * @description For `slope`: the axis of heights. Default: `+z`
+             * @enum {string}
+             */
+            up?: "+x" | "-x" | "+y" | "-y" | "+z" | "-z";
+            /**
+             * Zigzag
+             * @description For `slope`: whether slopes beyond the pairs are climbed in zig-zag; if not, faces that are steeper are closed. Default: `true`
+             */
+            zigzag?: boolean;
+            /**
+             * Direction
+             * @description `to`: the costs of getting to the sources. Default: `from`
+             * @enum {string}
+             */
+            direction?: "from" | "to";
+            /**
+             * Detail
+             * @description `fine`: twice the time, a third of the error. Default: `default`
+             * @enum {string}
+             */
+            detail?: "default" | "fine";
+            /**
+             * Max Cost
+             * @description Points that cost more count as unreachable
+             */
+            max_cost?: number | null;
         };
         /**
          * SurfaceCurve
