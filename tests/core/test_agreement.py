@@ -293,14 +293,14 @@ def check_promise(name: str, known: Known, found, table: np.ndarray) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.slice(8)
+@pytest.mark.slice(5)
 @pytest.mark.parametrize("name", BY_ENUMERATION)
 def test_every_way_keeps_its_promise(name: str) -> None:
     check(BY_ENUMERATION[name]())
 
 
 @pytest.mark.slow
-@pytest.mark.slice(8)
+@pytest.mark.slice(5)
 @pytest.mark.parametrize("name", BY_GEOMETRY)
 def test_every_way_keeps_its_promise_where_geometry_knows_all(name: str) -> None:
     check(BY_GEOMETRY[name]())

@@ -4,7 +4,7 @@ import pytest
 
 from tests.support.fresh import told_by
 
-pytestmark = pytest.mark.slow  # a process each
+pytestmark = [pytest.mark.slow, pytest.mark.jit]  # a process each
 
 SLOW = {
     *("scipy.linalg", "scipy.sparse", "scipy.spatial", "igl", "trimesh", "manifold3d", "pyvista"),

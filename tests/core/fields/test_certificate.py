@@ -271,6 +271,7 @@ def by_kernels(surface, function):
     return rises_and_jumps(surface, function, Control())
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("bounds", [verify.rises_and_jumps, by_kernels])
 @pytest.mark.parametrize("name", ["knot", "obstacles", "book_of_3"])
 def test_violations_bound_what_is_found_by_sampling(name, bounds):
@@ -321,6 +322,7 @@ def sampled(surface, arrays, count=23):
     return np.nanmax(value[:, None, :] - value[:, :, None] - apart, axis=(1, 2))
 
 
+@pytest.mark.jit
 def test_a_lost_window_is_told_by_its_face():
     mesh = gc.samples.knot(500)
     surface, question, given, distances = saved(mesh, 0)

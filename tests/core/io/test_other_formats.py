@@ -82,6 +82,7 @@ def test_a_file_that_was_cut_is_damaged(name: str, tmp_path: Path) -> None:
             gc.load_mesh(path)
 
 
+@pytest.mark.jit
 @pytest.mark.slice(10)
 @pytest.mark.parametrize("seed", range(120))
 @pytest.mark.parametrize("name", FILES)

@@ -355,6 +355,7 @@ def test_files_that_lead_to_other_files_and_files_that_lie_are_refused() -> None
         assert "\n" not in str(refusal.value)
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize(
     ("kind", "way", "left_out"),
     [
@@ -376,6 +377,7 @@ def test_no_memory_is_read_beyond_the_end_of_a_file(
     assert "0x" not in str(refusal.value)
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("way", ["inline", "inline lzma"])
 @pytest.mark.parametrize("kind", ["float32", "float64"])
 def test_no_points_without_values(kind: str, way: str, tmp_path: Path) -> None:
@@ -421,6 +423,7 @@ def test_cells_are_named_in_words() -> None:
     assert re.search(r"1 vertex cells, 1 poly line cells", str(refusal.value))
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("hostile", ["while True: pass", "import time; time.sleep(600)"])
 def test_the_time_of_a_read_is_limited_by_the_clock(
     hostile: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -466,6 +469,7 @@ def read(content: bytes) -> gc.TriangleMesh | InvalidMesh:
         return refusal
 
 
+@pytest.mark.jit
 @pytest.mark.slice(20)
 @pytest.mark.parametrize("number", range(500))
 def test_a_mutated_file_is_read_or_refused_and_always_alike(number: int, tmp_path: Path) -> None:

@@ -74,6 +74,7 @@ def test_rows_whose_runs_are_used_up_begin_anew_exactly():
         assert shares == sorted(shares)
 
 
+@pytest.mark.jit
 def test_rows_of_a_sweep_that_does_not_end_are_an_error(monkeypatch):
     mesh = gc.samples.knot(500)
 

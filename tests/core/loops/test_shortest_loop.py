@@ -17,6 +17,7 @@ def check_through(loop, point):
     assert loop.locations[0] == mesh.point(point)
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize(
     ("first", "second"),
     [((3, 0), (0, 2)), ((3, 0), (1.4, 2)), ((2, 0), (-0.9, 1.5)), ((5, 0), (2.4, 0.8))],
@@ -115,6 +116,7 @@ def test_where_every_loop_shrinks(make):
         gc.shortest_loop(make(), through=0)
 
 
+@pytest.mark.jit
 def test_barriers_are_holes():
     mesh = gc.samples.sphere(1280)
     height = mesh.vertices[mesh.faces].mean(axis=1)[:, 2]

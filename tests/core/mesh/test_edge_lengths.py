@@ -53,6 +53,7 @@ def on_torus(mesh, columns, rows, width, height, point) -> np.ndarray:
     return np.array(point.barycentric) @ places * [width / columns, height / rows]
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize(("columns", "rows"), [(17, 12), (40, 33), (5, 4), (3, 3)])
 def test_on_a_flat_torus_all_is_as_in_the_plane_modulo_its_sides(columns, rows):
     width, height = 1.7, 1.2

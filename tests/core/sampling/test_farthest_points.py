@@ -98,6 +98,7 @@ def test_each_part_gets_a_point_and_stray_vertices_none():
     assert found.nearest[-1] == -1
 
 
+@pytest.mark.jit
 def test_barriers_are_holes():
     mesh = gc.samples.plane(800)
     wall = [
