@@ -16,7 +16,7 @@ class Profile:
     >>> roof = gc.TriangleMesh([[0, 0, 0], [0, 2, 0], [4, 1, 3], [8, 1, 1]], [[0, 2, 1], [2, 3, 1]])
     >>> profile = roof.curve([0, 2, 3]).profile()
     >>> profile
-    Profile(8.12 on the map, 3 up, 2 down)
+    Profile(8.12311 on the map, 3 up, 2 down)
     >>> profile.slopes.round(2).tolist()
     [0.73, -0.5]
     """

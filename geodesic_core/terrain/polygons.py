@@ -99,7 +99,8 @@ def _of_geojson(document: Any, crs: Any) -> Iterator[tuple[Any, Any]]:
 
 def _as_polygon(shapely: Any, number: int, geometry: Any, crs: Any, ground: str | None) -> Any:
     try:
-        polygon = shapely.force_2d(shapely.geometry.shape(geometry))
+        with np.errstate(invalid="ignore"):  # NaN is refused below
+            polygon = shapely.force_2d(shapely.geometry.shape(geometry))
     except Exception as error:  # any failure of a parser
         raise InvalidPolygon(f"polygon {number} is no geometry: {error}", number) from error
     if polygon.geom_type not in ("Polygon", "MultiPolygon") or polygon.is_empty:
