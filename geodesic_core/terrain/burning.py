@@ -6,6 +6,8 @@ surface, and what is off the map, need no cases of their own. What meets at an e
 joined by the cut.
 """
 
+from __future__ import annotations
+
 from itertools import chain
 from typing import Any
 
