@@ -6,7 +6,7 @@ surface, and what is off the map, need no cases of their own. What meets at an e
 joined by the cut.
 """
 
-from __future__ import annotations
+from __future__ import annotations  # help() shows the names of types, not what they stand for
 
 from itertools import chain
 from typing import Any
