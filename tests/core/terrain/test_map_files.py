@@ -46,7 +46,7 @@ def test_files_are_in_wgs84(land: gc.terrain.Terrain, way: gc.CheapestPath, tmp_
     document = json.loads((tmp_path / "way.geojson").read_text())
     (feature,) = document["features"]
     places = np.array(feature["geometry"]["coordinates"])
-    assert document["type"], feature["geometry"]["type"] == ("FeatureCollection", "LineString")
+    assert (document["type"], feature["geometry"]["type"]) == ("FeatureCollection", "LineString")
     assert_allclose(utm_32(*places[:, :2].T), way.points[:, :2], atol=2e-3)
     assert_array_equal(places[:, 2], way.points[:, 2])
     assert feature["properties"] == {"cost": way.cost, "length": way.length}
