@@ -13,7 +13,7 @@ Examples
 [0.0, 1.0, 1.0, 1.414]
 """
 
-from geodesic_core import brain, errors, samples
+from geodesic_core import brain, errors, samples, terrain
 from geodesic_core.compilation import compile_kernels, warm_up
 from geodesic_core.control import Control
 from geodesic_core.costs.cheapest_path import CheapestPath
@@ -39,6 +39,7 @@ from geodesic_core.matrices.matrix_file import MatrixFile, write_matrix
 from geodesic_core.matrices.matrix_parts import MatrixParts
 from geodesic_core.mesh.barriers import walled_in
 from geodesic_core.mesh.curve import share_a_face
+from geodesic_core.mesh.profile import Profile
 from geodesic_core.mesh.report import MeshReport, Sample
 from geodesic_core.mesh.surface_curve import SurfaceCurve
 from geodesic_core.mesh.surface_point import Curve, Source, SurfacePoint
@@ -95,6 +96,7 @@ __all__ = [
     "MeshReport",
     "Nearest",
     "Polar",
+    "Profile",
     "RelaxedPoints",
     "Retain",
     "Sample",
@@ -140,6 +142,7 @@ __all__ = [
     "shortest_path",
     "spaced_levels",
     "straighten",
+    "terrain",
     "trace",
     "walled_in",
     "warm_up",

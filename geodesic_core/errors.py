@@ -9,12 +9,15 @@ They form a tree::
     │   ├── TooManyVertices     more than the caller allows
     │   └── FileTooLarge        more bytes than the caller allows
     ├── InvalidPoint            a source or target that is not on the mesh
+    │   ├── NoHeight            a place on the map where the surface is not
     │   └── NoTangentPlane      a point of the mesh where directions have no meaning
     ├── InvalidArgument         any other argument out of its domain
     │   ├── NoDirection         a vector that has no direction on the surface
     │   ├── NoLoop              loops asked for where every one shrinks to a point
     │   ├── OtherSurface        values by vertex, or by face, that are those of another surface
     │   ├── NoSuchLabel         a label or a region that no vertex of a surface has
+    │   ├── InvalidPolygon      a polygon that crosses itself, or lies off the surface
+    │   ├── UnsuitableCrs       a coordinate reference system that is not known, or of no use
     │   └── NotEmbedded         what needs space, asked of a mesh given by the lengths of its edges
     ├── NoPath                  not connected, or farther than a limit (``reason``)
     ├── Cancelled               the caller asked the sweep to stop
@@ -28,6 +31,7 @@ What is valid, but hardly meant, is a warning of Python's, see `warnings`::
     GeodesicWarning
     ├── EmptyBarrier            a label that blocks no face
     ├── EmptyParcel             a parcel that has no vertex in the region
+    ├── NotWgs84                GeoJSON in other coordinates than RFC 7946 has
     └── BlockedSource           a source that no path leaves, since all of its faces are blocked
 """
 
@@ -200,6 +204,19 @@ class InvalidArgument(GeodesicError):  # noqa: N818
     """
 
 
+class NoHeight(InvalidPoint):
+    """A place on the map where the surface is not: outside of it, or in a gap.
+
+    Examples
+    --------
+    >>> try:
+    ...     gc.samples.plane(2).locate_xy([2.0, 0.0])
+    ... except gc.errors.NoHeight as error:
+    ...     print(error)
+    the surface is not above or below the place, [2.0, 0.0]
+    """
+
+
 class NoTangentPlane(InvalidPoint):
     """A point where directions have no meaning: several fans of faces meet, or more than two faces.
 
@@ -300,6 +317,44 @@ class NoSuchLabel(InvalidArgument):
     ... except gc.errors.NoSuchLabel as error:
     ...     print(error)
     the roi has no vertex of the left surface
+    """
+
+
+class InvalidPolygon(InvalidArgument):
+    """A polygon that crosses itself, has no area, or does not meet the surface.
+
+    Parameters
+    ----------
+    message
+        The sentence for its reader.
+    index
+        Its number, where several are given.
+
+    Examples
+    --------
+    >>> square = {"type": "Polygon", "coordinates": [[[2, 2], [3, 2], [3, 3], [2, 2]]]}
+    >>> try:
+    ...     gc.terrain.burn(gc.samples.plane(2), square, np.inf)
+    ... except gc.errors.InvalidPolygon as error:
+    ...     print(error.index)
+    0
+    """
+
+    def __init__(self, message: str, index: int = 0) -> None:
+        super().__init__(message)
+        self.index = index
+
+
+class UnsuitableCrs(InvalidArgument):
+    """A coordinate reference system that is not known, or whose coordinates are no lengths.
+
+    Examples
+    --------
+    >>> try:
+    ...     gc.terrain.from_dem(np.zeros((2, 2)), (1, 0, 0, 0, -1, 0), crs="EPSG:4326")
+    ... except gc.errors.UnsuitableCrs as error:
+    ...     print(str(error).split(":")[0])
+    coordinates in WGS 84 are no lengths on a map
     """
 
 
@@ -452,6 +507,16 @@ class EmptyParcel(GeodesicWarning):
     Examples
     --------
     >>> issubclass(gc.errors.EmptyParcel, UserWarning)
+    True
+    """
+
+
+class NotWgs84(GeodesicWarning):
+    """GeoJSON in the coordinates of a surface whose CRS is not known, where WGS 84 is expected.
+
+    Examples
+    --------
+    >>> issubclass(gc.errors.NotWgs84, UserWarning)
     True
     """
 

@@ -247,6 +247,13 @@ runs through it, so that no face of the cut mesh is thinner than the rounding of
 moves by 1e-9 of an edge.
 """
 
+ALONG_EDGE = 1e-11
+"""Barycentric weight by which an edge of a polygon may be outside of a face and count as on it.
+
+That is rounding: on maps of 1e5 pixels a side, places have weights that are off by 1e-12. Well
+below `MERGE`, within which a cut makes one of what both faces of an edge have found there.
+"""
+
 SNAP = 1e-12
 """Share of the bounding box's diagonal within which a position counts as on a vertex or an edge."""
 

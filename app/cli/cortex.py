@@ -2,9 +2,7 @@
 
 import csv
 import json
-import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -24,7 +22,7 @@ from app.cli.output import AsJson, Output, print_json
 from app.cli.steps import show_help_without_command, showing
 from app.cli.summary import print_bound, print_size
 from app.cli.tables import Threads
-from app.cli.words import say_warning
+from app.cli.words import told_warnings
 
 if TYPE_CHECKING:
     from geodesic_core import MatrixFile
@@ -152,7 +150,7 @@ def parcels(
 
     options = accuracy(method, relative_error, absolute_error, effort)
     opened = _opened(surfaces, roi, wall, corrected_areas)
-    with _told_warnings():
+    with told_warnings():
         parcellation = gc.brain.load_parcels(_one_or_all(labels), opened)
     with showing("Computing the distances") as step, files.writing(out):
         found = gc.brain.parcel_distances(
@@ -238,7 +236,7 @@ def _opened(
 
         gc.warm_up(["exact"])
     given = {each[0]: each[1] for each in named} if any(are_named) else list(surfaces)
-    with showing("Reading the surfaces"), _told_warnings():
+    with showing("Reading the surfaces"), told_warnings():
         areas = None if not corrected_areas else _one_or_all(corrected_areas)
         mask = None if not roi else _one_or_all(roi)
         return gc.brain.load_cortex(given, mask, wall, corrected_areas=areas)
@@ -246,15 +244,6 @@ def _opened(
 
 def _one_or_all(paths: Sequence[Path]) -> Any:
     return paths[0] if len(paths) == 1 else list(paths)
-
-
-@contextmanager
-def _told_warnings() -> Iterator[None]:
-    """Print the library's warnings on standard error."""
-    with warnings.catch_warnings(record=True, action="always") as told:
-        yield
-    for warning in told:
-        say_warning(str(warning.message))
 
 
 def _filled(options: Mapping[str, Any]) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from app.cli import batch, compilation, meshes, queries, serve, tables
 from app.cli.cortex import cortex
 from app.cli.steps import Failure, show_help_without_command
 from app.cli.store import store
+from app.cli.terrain import terrain
 from app.cli.words import refusal_of, with_options
 
 FAILED, INTERRUPTED = 1, 130
@@ -81,3 +82,4 @@ for name, command in queries.COMMANDS.items():
 cli.command("compile")(compilation.compile_kernels)
 cli.add_typer(cortex, name="cortex")
 cli.add_typer(store, name="store")
+cli.add_typer(terrain, name="terrain")

@@ -1,7 +1,9 @@
 """Faults in the words of the command line: options, where models and the library have names."""
 
 import re
-from collections.abc import Mapping
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import typer
@@ -41,6 +43,15 @@ def refusal_of(fault: Mapping[str, Any]) -> str:
 def say_warning(message: str) -> None:
     """Print a warning on standard error."""
     typer.echo(f"warning: {with_options(message)}", err=True)
+
+
+@contextmanager
+def told_warnings() -> Iterator[None]:
+    """Print warnings of the library on standard error."""
+    with warnings.catch_warnings(record=True, action="always") as told:
+        yield
+    for warning in told:
+        say_warning(str(warning.message))
 
 
 def with_options(message: str) -> str:

@@ -1,6 +1,6 @@
 """Cost fields: what it costs to get to every vertex, or back from there."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
@@ -18,8 +18,10 @@ from geodesic_core.errors import NoPath
 from geodesic_core.fields.distance_field import solve
 from geodesic_core.fields.path import ErrorBound
 from geodesic_core.fields.question import Question
+from geodesic_core.fields.scalar_field import ScalarField
 from geodesic_core.fields.sweeps import ExactSweep
 from geodesic_core.mesh.curve import Polyline, weights_by_face
+from geodesic_core.mesh.surface_curve import SurfaceCurve
 from geodesic_core.mesh.surface_point import Point, Source
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.reprs import as_table
@@ -38,8 +40,7 @@ vertices were off by 1.35 times that at most, and half of the time by 0.84 times
 class CostField:
     """What the cheapest way costs from the sources to each vertex, or from each to the sources.
 
-    ``numpy.asarray(field)`` is `costs`, and ``field[5]`` is the cost of vertex 5. For lines of
-    equal cost, make it a `ScalarField`.
+    ``numpy.asarray(field)`` is `costs`, and ``field[5]`` is the cost of vertex 5.
 
     Examples
     --------
@@ -47,7 +48,7 @@ class CostField:
     >>> field = gc.cost_distance(mesh, 0, np.full(200, 2.0))
     >>> round(float(field[10]), 6)
     2.0
-    >>> (line,) = gc.ScalarField(mesh, field.costs).isolines([1.0])[0]
+    >>> (line,) = field.isochrones([1.0])[0]
     >>> float(np.linalg.norm(line.points, axis=1).round(1).max())
     0.5
     """
@@ -221,6 +222,39 @@ class CostField:
             raise NoPath(f"no path joins {place} and the sources", "disconnected")
         control.finish()
         return path
+
+    def isochrones(self, levels: Sequence[float]) -> list[list[SurfaceCurve]]:
+        """Return the lines of equal cost: isochrones, where costs are times.
+
+        They are those of a `ScalarField` of `costs`, which is linear on each face. They end where
+        nothing is reached.
+
+        Parameters
+        ----------
+        levels
+            Finite numbers.
+
+        Returns
+        -------
+        list of list of SurfaceCurve
+            The lines of each level, longest first.
+
+        Raises
+        ------
+        InvalidArgument
+            A level is not a finite number.
+
+        Notes
+        -----
+        O(F) for each level.
+
+        Examples
+        --------
+        >>> field = gc.cost_distance(gc.samples.plane(200), 0, np.full(200, 2.0))
+        >>> [len(lines) for lines in field.isochrones([0.5, 1.0])]
+        [1, 1]
+        """
+        return ScalarField(self.mesh, self.costs).isolines(levels)
 
     def lower_bounds(
         self,

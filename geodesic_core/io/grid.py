@@ -3,7 +3,9 @@
 import re
 
 import numpy as np
+from numpy.typing import NDArray
 
+from geodesic_core.arrays import Longs
 from geodesic_core.errors import InvalidMesh
 from geodesic_core.io.contents import FileContents
 from geodesic_core.io.limits import check_face_count
@@ -43,15 +45,25 @@ def read_grid(data: bytes, max_faces: int | None) -> FileContents:
     with np.errstate(over="ignore", invalid="ignore"):  # the mesh refuses what is not finite
         x = _lowest(header, "x") + column * header.get("dx", header["cellsize"])
         y = _lowest(header, "y") + (rows - 1 - row) * header.get("dy", header["cellsize"])
-    number = np.where(measured, np.cumsum(measured) - 1, -1).reshape(rows, columns)
-    corners = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]
-    squares = np.stack([corner.ravel() for corner in corners], axis=1)
-    faces = squares[(squares >= 0).all(axis=1)][:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+    faces = grid_faces(measured.reshape(rows, columns))
     gaps = len(words) - len(row)
     word = "gap, which is a hole" if gaps == 1 else "gaps, which are holes"
     notes = (f"The grid has {gaps} {word} of the surface.",) if gaps else ()
     vertices = np.stack([x, y, heights[measured]], axis=1)
     return FileContents.of_triangles(vertices, faces, notes=notes)
+
+
+def grid_faces(measured: NDArray[np.bool_]) -> Longs:
+    """Return two faces for every four neighbours of a grid that are all measured, (F, 3).
+
+    What is measured, (rows, columns), has the numbers of vertices in the order of the grid. Faces
+    are wound as seen from above where rows go from north to south, and columns to the east.
+    """
+    number = np.where(measured, np.cumsum(measured).reshape(measured.shape) - 1, -1)
+    corners = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]
+    squares = np.stack([corner.ravel() for corner in corners], axis=1)
+    faces: Longs = squares[(squares >= 0).all(axis=1)][:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+    return faces
 
 
 def _read_header(data: bytes) -> tuple[dict[str, float], int]:

@@ -19,6 +19,7 @@ from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL
 from geodesic_core.kernels.mesh.locations import Locations, drop_repeats, locate_points
 from geodesic_core.mesh.curve_file import CurveRecord, write_curve_file
 from geodesic_core.mesh.edge_lengths import flat_points, weights_in_faces
+from geodesic_core.mesh.profile import Profile, profile_of
 from geodesic_core.mesh.surface_point import Curve, Point, Points, Source, SurfacePoint
 from geodesic_core.plotting import PATH, PATH_WIDTH, Camera
 from geodesic_core.reprs import as_table
@@ -194,6 +195,29 @@ class SurfaceCurve:
         located = located_in(mesh, self._inner_faces[k], (1.0 - share) * start[k] + share * end[k])
         chords = np.full(count, NO_FACE, np.int32)
         return SurfaceCurve(mesh, chords, self.closed, self.length, located)
+
+    def profile(self) -> Profile:
+        """Return the heights along the curve: z, over the plane of x and y.
+
+        Returns
+        -------
+        Profile
+            Of `points`, back to the first one where the curve is closed.
+
+        Raises
+        ------
+        NotEmbedded
+            The mesh is given by lengths alone.
+
+        Examples
+        --------
+        >>> slope = gc.TriangleMesh([[0, 0, 0], [4, 0, 3], [0, 4, 0]], [[0, 1, 2]])
+        >>> profile = slope.curve([0, 1]).profile()
+        >>> profile.chainage.tolist(), profile.ascent, profile.slopes.tolist()
+        ([0.0, 4.0], 3.0, [0.75])
+        """
+        points = self.points
+        return profile_of(np.concatenate([points, points[:1]]) if self.closed else points)
 
     def save(self, path: str | Path) -> None:
         """Write the curve into a file, in the format that its suffix names.

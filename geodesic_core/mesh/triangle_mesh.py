@@ -12,7 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from geodesic_core import plotting
 from geodesic_core.arrays import Floats, Ints, Longs
-from geodesic_core.errors import InvalidArgument, InvalidMesh, InvalidPoint, NotEmbedded
+from geodesic_core.errors import (
+    InvalidArgument,
+    InvalidMesh,
+    InvalidPoint,
+    NoHeight,
+    NotEmbedded,
+)
 from geodesic_core.kernels.mesh import build
 from geodesic_core.kernels.mesh.half_edges import (
     LENGTH,
@@ -728,8 +734,10 @@ class TriangleMesh:
         InvalidArgument
             The surface is not a height over the plane: a face is upright or turned over, or it has
             several heights at a place.
+        NoHeight
+            The surface is not there.
         InvalidPoint
-            A place is not two finite numbers, or the surface is not there.
+            A place is not two finite numbers.
         MissingExtra
             libigl is not installed; the extra ``locate`` brings it.
 
@@ -753,7 +761,7 @@ class TriangleMesh:
         snap = self._snap_at(np.append(away, 0.0))
         found = self._height_field(away, snap)
         if found is None:
-            raise InvalidPoint(f"the surface is not above or below the {name}, {wanted.tolist()}")
+            raise NoHeight(f"the surface is not above or below the {name}, {wanted.tolist()}")
         face, point = found
         corners = (self.vertices[self.faces[face]] - self.origin) * [1.0, 1.0, 0.0]
         return self._point_in_face(face, canonical.weights_of(point, corners, snap), name)

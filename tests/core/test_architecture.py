@@ -10,6 +10,7 @@ from tests.support.paths import ROOT
 
 PARTS = [
     "brain",
+    "terrain",
     "compilation",
     "solvers",
     "matrices",

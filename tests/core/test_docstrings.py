@@ -20,6 +20,7 @@ PACKAGES = {
     "gc.brain": gc.brain,
     "gc.errors": gc.errors,
     "gc.samples": gc.samples,
+    "gc.terrain": gc.terrain,
 }
 
 
@@ -69,8 +70,10 @@ RECORDS |= {
     "gc.RelaxedPoints",
     "gc.LogMap",
     "gc.Polar",
+    "gc.Profile",
     "gc.StraightLine",
     "gc.TangentFrames",
+    "gc.terrain.Terrain",
 }
 """Classes whose attributes are documented one by one: users read them, and make none."""
 

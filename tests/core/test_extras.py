@@ -9,7 +9,8 @@ from tests.support.fresh import told_by
 
 WITHOUT = """
 import sys
-sys.modules["scipy"] = sys.modules["igl"] = sys.modules["pyvista"] = None
+for name in ("scipy", "igl", "pyvista", "rasterio", "pyproj", "shapely"):
+    sys.modules[name] = None
 import numpy as np
 import geodesic_core as gc
 mesh = gc.samples.plane(8)
@@ -24,6 +25,14 @@ REFUSED = [
         "locate",
         "mesh.locate([0.5, 0.5, 1.0])",
         "TriangleMesh.locate needs libigl: pip install 'geodesic-core[locate]'",
+    ),
+    *(
+        ("terrain", code, f"{call} needs {package}: pip install 'geodesic-core[terrain]'")
+        for code, call, package in (
+            ("gc.terrain.from_dem('dem.tif')", "from_dem of a file", "rasterio"),
+            ("gc.terrain.from_dem(np.eye(2), range(6), crs=32632)", "a CRS", "pyproj"),
+            ("gc.terrain.burn(mesh, {}, 2.0)", "burn", "shapely"),
+        )
     ),
     *(
         ("plot", f"{thing}()", f"{call} needs PyVista: pip install 'geodesic-core[plot]'")
