@@ -16,8 +16,8 @@ pytestmark = [pytest.mark.slow, pytest.mark.file_slice(2)]
 
 WORK = [ROOT / "geodesic_core", ROOT / "app/encoding", ROOT / "app/queries"]
 NOT_FOR_WORKERS = {"nibabel", "vtkmodules", "zarr", "pyarrow", "pyvista", "PIL", "trimesh"}
-NOT_FOR_WORKERS |= {"ezdxf"}
-"""Packages for rare formats and for pictures, and VTK, which has processes of its own"""
+NOT_FOR_WORKERS |= {"ezdxf", "pyproj", "rasterio", "shapely"}
+"""Packages for rare formats, maps and pictures, and VTK, which has processes of its own"""
 
 
 def late_imports(path: Path) -> set[str]:

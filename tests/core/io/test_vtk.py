@@ -470,7 +470,7 @@ def read(content: bytes) -> gc.TriangleMesh | InvalidMesh:
 
 
 @pytest.mark.jit
-@pytest.mark.slice(20)
+@pytest.mark.slice(10)
 @pytest.mark.parametrize("number", range(500))
 def test_a_mutated_file_is_read_or_refused_and_always_alike(number: int, tmp_path: Path) -> None:
     content = mutant(number, tmp_path / "mesh.vtk")
