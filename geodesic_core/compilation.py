@@ -188,7 +188,7 @@ def compile_kernels(
 
     Notes
     -----
-    All kernels take about 90 s of processor time, in as many processes as there are cores. The
+    All kernels take about 200 s of processor time, in as many processes as there are cores. The
     number of compiled kernels is written to standard error, unless ``GEODESIC_QUIET`` is set. Where
     the cache cannot be written, nothing is compiled ahead.
 

@@ -220,7 +220,7 @@ def _opened(
     wall: Literal["blocks", "passes"] | None,
     corrected_areas: Sequence[Path] | None,
 ) -> "Cortex":
-    """Return the cortex that options name, and print what is hardly meant."""
+    """Return the cortex that options name, and print warnings of the library."""
     if (wall is None) != (not roi):
         raise typer.BadParameter(
             "--roi needs --wall: 'blocks' keeps paths inside of it, 'passes' lets them through"
@@ -321,12 +321,12 @@ def _write_table(found: "ParcelDistances", path: Path) -> None:
             found.centroids.tolist(),
             strict=True,
         ):
-            own = next(s for s in parcellation.cortex.structures if vertex in range(*_span(s)))
+            own = next(
+                each
+                for each in parcellation.cortex.structures
+                if each.part.start <= vertex < each.part.stop
+            )
             rows.writerow([name, key, size, area, own.side, vertex - own.first])
-
-
-def _span(structure: Any) -> tuple[int, int]:
-    return structure.first, structure.first + structure.count
 
 
 def _write_borders(parcellation: "Parcellation", path: Path) -> None:

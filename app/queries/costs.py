@@ -52,7 +52,7 @@ def library_cost(cost: SurfaceCost) -> Any:
     return slope if faces is None else (faces, slope)
 
 
-def refused_costs() -> AbstractContextManager[None]:
+def naming_cost() -> AbstractContextManager[None]:
     """Name the member that an error of the library is about."""
     kinds = gc.errors.NotEmbedded, gc.errors.InvalidArgument
     return naming(*zip(kinds, ("/cost/slope", "/cost/faces"), strict=True))
@@ -94,7 +94,7 @@ def solve_costs(
 ) -> CostsAsDistances:
     """Return what it costs to get from some sources, or to them."""
     given = library_cost(cost)
-    with refused_costs():
+    with naming_cost():
         field = opened.solver.cost_distance(
             sources,
             given,

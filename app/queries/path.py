@@ -13,7 +13,7 @@ from app.queries import point_text
 from app.queries.accuracy import bound_of, options_of, solve_field, with_default_accuracy
 from app.queries.base import VALUES_OF_POINT, ExecutionContext, Query
 from app.queries.cost_model import PER_FACE_CERTIFIED, search_seconds, share_reached, sweep_seconds
-from app.queries.costs import CHEAPEST, ROUGHLY, check_alone, library_cost, refused_costs, sweeps_of
+from app.queries.costs import CHEAPEST, ROUGHLY, check_alone, library_cost, naming_cost, sweeps_of
 from app.queries.outline import SHOWN, no_outline, outline_of
 from app.queries.points import SurfacePoints, describe_point, numbered
 from app.queries.proofs import check_proof_format, told
@@ -138,7 +138,7 @@ class PathQuery(Query[PathRequest]):
         source, target = points
         given = library_cost(cost)
         try:
-            with refused_costs():
+            with naming_cost():
                 path = opened.solver.cheapest_path(
                     source, target, given, cost.max_cost, detail=cost.detail, **context.options
                 )

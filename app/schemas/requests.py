@@ -416,7 +416,7 @@ class Stops(AmongBarriers):
     target: Point
     waypoints: FailFastList[Point] = Field(
         default=[],
-        description="The path is shortest from each stop to the next; for `exact` only",
+        description="The path is shortest from each stop to the next; not for `approximate`",
     )
     max_distance: NonNegative | None = Field(
         default=None, description="Longest path to look for, past all waypoints, in mesh units"

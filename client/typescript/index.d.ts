@@ -2616,7 +2616,7 @@ export interface components {
             target: number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"];
             /**
              * Waypoints
-             * @description The path is shortest from each stop to the next; for `exact` only. Default: `[]`
+             * @description The path is shortest from each stop to the next; not for `approximate`. Default: `[]`
              */
             waypoints?: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[];
             /**
@@ -3174,7 +3174,7 @@ export interface components {
             target: number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"];
             /**
              * Waypoints
-             * @description The path is shortest from each stop to the next; for `exact` only. Default: `[]`
+             * @description The path is shortest from each stop to the next; not for `approximate`. Default: `[]`
              */
             waypoints?: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[];
             /**
