@@ -50,11 +50,10 @@ def options_of(request: Accuracy) -> dict[str, Any]:
 
 
 def as_swept(request: A, mesh: gc.TriangleMesh) -> A:
-    """Return the request by the sweep that answers it: an exact one on rough meshes."""
-    if request.method != "approximate" or not mesh.is_rough:
+    """Return the request by the sweep that answers it: an exact one where no other is quicker."""
+    if gc.error_bound(mesh, **options_of(request)).value > 0.0:
         return request
-    exact = {"method": "exact", "relative_error": None, "absolute_error": None}
-    return request.model_copy(update=exact)
+    return request.model_copy(update={"method": "exact"} | dict.fromkeys(_options_of(request)))
 
 
 def solve_field(

@@ -75,7 +75,8 @@ class AccuracyOrEffort(Accuracy):
 
     effort: Effort | None = Field(
         default=None,
-        description="For `fast`: more effort takes more time and lowers the error; 2 by default",
+        description="For `fast`: more effort takes more time and lowers the error; 2 by default. "
+        "With 4 and 8 the sweep is exact where that takes no longer, as `error_bound` tells",
     )
 
 

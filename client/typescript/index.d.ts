@@ -1265,7 +1265,7 @@ export interface components {
             absolute_error?: number | null;
             /**
              * Effort
-             * @description For `fast`: more effort takes more time and lowers the error; 2 by default
+             * @description For `fast`: more effort takes more time and lowers the error; 2 by default. With 4 and 8 the sweep is exact where that takes no longer, as `error_bound` tells
              */
             effort?: (1 | 2 | 4 | 8) | null;
             /** Sources */
@@ -2176,7 +2176,7 @@ export interface components {
             absolute_error?: number | null;
             /**
              * Effort
-             * @description For `fast`: more effort takes more time and lowers the error; 2 by default
+             * @description For `fast`: more effort takes more time and lowers the error; 2 by default. With 4 and 8 the sweep is exact where that takes no longer, as `error_bound` tells
              */
             effort?: (1 | 2 | 4 | 8) | null;
             /**
@@ -2762,7 +2762,7 @@ export interface components {
             absolute_error?: number | null;
             /**
              * Effort
-             * @description For `fast`: more effort takes more time and lowers the error; 2 by default
+             * @description For `fast`: more effort takes more time and lowers the error; 2 by default. With 4 and 8 the sweep is exact where that takes no longer, as `error_bound` tells
              */
             effort?: (1 | 2 | 4 | 8) | null;
             /** Source */

@@ -18,6 +18,9 @@ Method = Literal["exact", "approximate", "fast"]
 Effort = Literal[1, 2, 4, 8]
 """Places of a half-edge at which a fast sweep compares windows"""
 
+FAST_FROM = {4: 20_000, 8: 100_000}
+"""Faces from which on sweeps of the larger efforts take less time than exact ones"""
+
 SweepOf = Callable[[Question], Sweep]
 """Function that returns the sweep of a question"""
 
@@ -29,7 +32,7 @@ def sweep_of(
     absolute_error: float | None = None,
     effort: Effort = 2,
 ) -> SweepOf:
-    """Return the sweep of a method on a mesh: `ExactSweep` itself where that is exact.
+    """Return the sweep of a method on a mesh: `ExactSweep` itself where no other is quicker.
 
     Raises
     ------
@@ -38,12 +41,19 @@ def sweep_of(
     """
     check_choice("method", method, get_args(Method))
     if method == "fast":
-        return partial(FastSweep, effort=as_effort(effort))
+        places = as_effort(effort)
+        if not _is_quicker_exactly(mesh, places):
+            return partial(FastSweep, effort=places)
     if method == "approximate":
         relative, absolute = _as_errors(relative_error, absolute_error)
-        if not mesh.is_rough:  # rounding there exceeds what merging is allowed
+        if not mesh.is_rough:  # where merging saves no time
             return partial(MergingSweep, relative_error=relative, absolute_error=absolute)
     return ExactSweep
+
+
+def _is_quicker_exactly(mesh: TriangleMesh, effort: int) -> bool:
+    """Whether an exact sweep takes about the time of a fast one, or less; see docs/accuracy.md."""
+    return effort in FAST_FROM and (len(mesh.faces) < FAST_FROM[effort] or mesh.is_rough)
 
 
 def promise_of(
@@ -62,7 +72,8 @@ def promise_of(
     """
     check_choice("method", method, get_args(Method))
     if method == "fast":
-        return estimated(as_effort(effort))
+        places = as_effort(effort)
+        return EXACT if _is_quicker_exactly(mesh, places) else estimated(places)
     if method == "exact":
         return EXACT
     errors = _as_errors(relative_error, absolute_error)

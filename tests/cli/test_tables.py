@@ -100,7 +100,7 @@ def test_all_vertices_by_each_method(run: Run, sphere: Path) -> None:
     for options, bound in (
         ([], "0.0 (relative, guaranteed)"),
         (["--method", "approximate", "--relative-error", 0.01], "0.002 (relative, guaranteed)"),
-        (["--method", "fast", "--effort", 8], "(relative, estimated)"),
+        (["--method", "fast", "--effort", 1], "(relative, estimated)"),
     ):
         ran = run("matrix", sphere, "--points", "all", *options, "--out", "all.npy")
         assert ran.code == 0

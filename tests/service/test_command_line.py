@@ -16,8 +16,8 @@ from tests.support.commands import Run
 FACE = {"face": 40, "barycentric": [0.2, 0.3, 0.5]}
 CURVE = {"polyline": [{"vertex": 3}, {"vertex": 3}]}
 APPROXIMATE = {"method": "approximate", "relative_error": 0.01}
-FAST = {"method": "fast", "effort": 4}
-AS_FAST = "--method fast --effort 4"
+FAST = {"method": "fast", "effort": 2}
+AS_FAST = "--method fast --effort 2"
 AS_APPROXIMATE = "--method approximate --relative-error 0.01"
 
 

@@ -9,7 +9,7 @@ from starlette.testclient import TestClient
 import geodesic_core as gc
 from tests.support.service import check_problem, distances, stored_mesh, upload_sample
 
-EFFORTS = 1, 2, 4, 8
+EFFORTS = 1, 2
 ROUNDING = 1e-9
 SOURCES = [{"vertex": 3}, {"vertex": 400, "start_distance": 0.25}]
 ENDS = {"source": {"vertex": 3}, "target": {"vertex": 700}}

@@ -104,7 +104,7 @@ def test_pairs(client: TestClient, knot: str, table: np.ndarray) -> None:
 
 APPROXIMATE = {"method": "approximate", "relative_error": 1e-3}
 WITHIN = {"method": "approximate", "absolute_error": 1e-3}
-FAST = {"method": "fast", "effort": 4}
+FAST = {"method": "fast", "effort": 2}
 
 
 @pytest.mark.parametrize("layout", ["dense", "sparse", "pairs"])

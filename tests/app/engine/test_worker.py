@@ -189,7 +189,7 @@ def test_caches_are_emptied_where_memory_runs_out(
 @pytest.mark.usefixtures("every_field_is_slow")
 @pytest.mark.parametrize(
     "accuracy",
-    [{}, {"method": "approximate", "relative_error": 0.01}, {"method": "fast", "effort": 4}],
+    [{}, {"method": "approximate", "relative_error": 0.01}, {"method": "fast", "effort": 2}],
 )
 def test_a_field_that_took_long_is_stored_for_other_workers(
     tmp_path: Path, sweeps: list[int], accuracy: dict[str, Any]
@@ -286,7 +286,7 @@ def test_a_defect_is_logged_and_becomes_a_problem(
 
 @pytest.mark.parametrize(
     "accuracy",
-    [{}, {"method": "approximate", "relative_error": 0.01}, {"method": "fast", "effort": 4}],
+    [{}, {"method": "approximate", "relative_error": 0.01}, {"method": "fast", "effort": 2}],
 )
 def test_work_that_is_asked_to_stop_stops(tmp_path: Path, accuracy: dict[str, Any]) -> None:
     signals = Signals(stop_number=2)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.fields import fast_sweep, sweep
+from geodesic_core.fields import fast_sweep, methods, sweep
 from geodesic_core.kernels.fast import state as fast_state
 from geodesic_core.kernels.fast.buckets import push
 from geodesic_core.kernels.fast.places import offer
@@ -39,6 +39,12 @@ SOURCES = {
 each_source = pytest.mark.parametrize("source", list(SOURCES))
 
 
+@pytest.fixture
+def always_fast(monkeypatch):
+    """Fast sweeps of every effort, even where exact ones are as quick."""
+    monkeypatch.setattr(methods, "FAST_FROM", {})
+
+
 def check_never_below(found: np.ndarray, exact: np.ndarray) -> None:
     """Reached where the exact ones are, and no nearer."""
     np.testing.assert_array_equal(np.isfinite(found), np.isfinite(exact))
@@ -66,6 +72,7 @@ def reached_by(field: gc.DistanceField, count: int) -> list[int]:
 
 
 @pytest.mark.jit
+@pytest.mark.usefixtures("always_fast")
 @zoo.each(MERGING)
 def test_more_effort_brings_accuracy(case):
     mesh = mesh_of(case)
@@ -82,6 +89,7 @@ def test_more_effort_brings_accuracy(case):
 
 
 @pytest.mark.jit
+@pytest.mark.usefixtures("always_fast")
 @each_source
 @each_effort
 @pytest.mark.parametrize("name", ["land", "islands", "ring"])
@@ -121,6 +129,7 @@ def test_points_that_were_no_targets_and_isolines_are_exact(source):
 
 
 @pytest.mark.jit
+@pytest.mark.usefixtures("always_fast")
 @each_effort
 def test_barriers_and_limits(effort):
     mesh = mesh_of(MERGING["land"])
@@ -156,6 +165,7 @@ def test_ties_go_to_the_lower_source():
     assert gc.fast_distance(mesh, [0, 3]).nearest_source.tolist() == [0, 0, 0, 1]
 
 
+@pytest.mark.usefixtures("always_fast")
 @each_effort
 def test_the_same_to_the_bit_whatever_the_slices_and_the_room(effort, monkeypatch):
     mesh = mesh_of(MERGING["ring"])
@@ -180,7 +190,7 @@ def test_the_same_to_the_bit_whatever_the_slices_and_the_room(effort, monkeypatc
 @pytest.mark.parametrize("retain", ["distances", "paths"])
 def test_arrays_make_the_same_field(retain):
     mesh = mesh_of(MERGING["land"])
-    field = gc.fast_distance(mesh, [SOURCES["curve"](mesh), 5], 4, targets=[9], retain=retain)
+    field = gc.fast_distance(mesh, [SOURCES["curve"](mesh), 5], 2, targets=[9], retain=retain)
     again = gc.DistanceField.from_arrays(mesh, field.arrays())
     np.testing.assert_array_equal(again.distances, field.distances)
     assert again.error_bound == field.error_bound
@@ -214,6 +224,7 @@ def test_windows_are_not_retained():
         gc.fast_distance(mesh, 0, retain="windows")
 
 
+@pytest.mark.usefixtures("always_fast")
 def test_the_error_is_estimated_by_effort():
     mesh = gc.samples.plane(2)
     bounds = [gc.fast_distance(mesh, 0, effort).error_bound for effort in (1, 2, 4, 8)]
@@ -221,7 +232,38 @@ def test_the_error_is_estimated_by_effort():
     assert [bound.value for bound in bounds] == sorted({b.value for b in bounds}, reverse=True)
 
 
+@pytest.mark.parametrize("effort", [4, 8])
+def test_larger_efforts_run_exactly_where_that_is_as_quick(effort):
+    mesh = mesh_of(MERGING["ring"])
+    found, exact = gc.fast_distance(mesh, 3, effort), gc.exact_distance(mesh, 3)
+    assert found.error_bound == exact.error_bound == gc.error_bound(mesh, "fast", effort=effort)
+    assert found.distances.tobytes() == exact.distances.tobytes()
+    assert found.stats.windows_created == exact.stats.windows_created
+    np.testing.assert_array_equal(found.path_to(7).points, exact.path_to(7).points)
+    together = gc.distance_matrix(mesh, [3], method="fast", effort=effort)
+    assert together.tobytes() == gc.distance_matrix(mesh, [3]).tobytes()
+
+
+@pytest.mark.parametrize(
+    ("faces", "is_rough", "fast"),
+    [
+        (19_999, False, [1, 2]),
+        (20_000, False, [1, 2, 4]),
+        (99_999, False, [1, 2, 4]),
+        (100_000, False, [1, 2, 4, 8]),
+        (100_000, True, [1, 2]),
+    ],
+)
+def test_the_efforts_of_a_fast_sweep(monkeypatch, faces, is_rough, fast):
+    mesh = gc.TriangleMesh(np.eye(3), np.tile([[0, 1, 2]], (faces, 1)))
+    monkeypatch.setitem(vars(mesh), "is_rough", is_rough)
+    bounds = {effort: gc.error_bound(mesh, "fast", effort=effort) for effort in (1, 2, 4, 8)}
+    assert [effort for effort, bound in bounds.items() if bound.kind == "estimated"] == fast
+    assert all(bound.value == 0.0 for effort, bound in bounds.items() if effort not in fast)
+
+
 @pytest.mark.jit
+@pytest.mark.usefixtures("always_fast")
 @pytest.mark.parametrize(("most", "ends"), [(0, False), (12, True), (MOST_CROSSINGS, True)])
 def test_most_crossings_are_more_than_a_fast_sweep_needs(monkeypatch, most, ends):
     mesh = gc.samples.sphere(20480)

@@ -18,7 +18,7 @@ FIELDS = {
     "windows": lambda: gc.exact_distance(MESH, INSIDE, targets=INSIDE, retain="windows"),
     "distances": lambda: gc.exact_distance(MESH, gc.Curve([0, 1]), retain="distances"),
     "approximate": lambda: gc.approximate_distance(MESH, 3, 0.05, retain="paths"),
-    "fast": lambda: gc.fast_distance(MESH, 3, effort=4),
+    "fast": lambda: gc.fast_distance(MESH, 3, effort=1),
     "barriers": lambda: gc.exact_distance(MESH, 3, barriers=range(100, 130)),
 }
 

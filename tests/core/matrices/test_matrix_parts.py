@@ -19,7 +19,7 @@ METHODS: list[dict[str, Any]] = [
     {},
     {"method": "approximate", "relative_error": 1e-3},
     {"method": "approximate", "relative_error": None, "absolute_error": 1e-3},
-    {"method": "fast", "effort": 4},
+    {"method": "fast", "effort": 2},
 ]
 
 

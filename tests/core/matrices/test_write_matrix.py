@@ -93,7 +93,7 @@ def test_distances_are_those_of_the_oracle(case, suffix, tmp_path):
     "options",
     [
         {"method": "approximate", "relative_error": 1e-2},
-        {"method": "fast", "effort": 4},
+        {"method": "fast", "effort": 2},
         {"max_distance": 0.7},
         {"barriers": range(8, 48), "dtype": "float32"},
     ],
@@ -147,7 +147,7 @@ def test_the_facts_hold_all_that_the_table_is_made_from(mesh, tmp_path):
     on_edge = mesh.point(gc.SurfacePoint.edge(7, 1, 0.25))
     questions = [
         (np.array([3, 7]), None, {}),
-        ([9, inside, on_edge, gc.SurfacePoint.vertex(4)], [0], {"method": "fast", "effort": 4}),
+        ([9, inside, on_edge, gc.SurfacePoint.vertex(4)], [0], {"method": "fast", "effort": 2}),
         ("all", [inside], {"barriers": [31, 30], "max_distance": 0.75}),
         ([5], "all", {"method": "approximate", "relative_error": None, "absolute_error": 0.01}),
         ("all", None, {"dtype": "float32", "max_distance": 0.5}),
