@@ -88,6 +88,7 @@ def test_fields_are_those_of_paths() -> None:
     assert np.abs(there.costs[targets] / back.costs[targets] - 1.0).max() > 0.01
 
 
+@pytest.mark.jit
 def test_sources_anywhere_and_several() -> None:
     """A curve, a point in a face, one that starts later; against an exact sweep."""
     inside = gc.SurfacePoint.face(300, (0.2, 0.3, 0.5))

@@ -161,7 +161,7 @@ def test_approximate_distances_are_no_longer_than_exact_ones(name):
 
 
 def test_fields_tell_that_they_are_certified():
-    field = gc.exact_distance(gc.samples.knot(1000), 0)
+    field = gc.exact_distance(gc.samples.knot(500), 0)
     assert field.error_bound.kind == "guaranteed"
     certificate = field.certify()
     bound = field.error_bound

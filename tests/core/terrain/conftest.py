@@ -15,13 +15,13 @@ def rough(rows: int = 30, columns: int = 40) -> np.ndarray:
     return 20.0 * np.sin(row / 3.0) * np.cos(column / 4.0) + 0.3 * column
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def land() -> gc.terrain.Terrain:
     """Return 30 rows and 40 columns: from 451005 to 451395 and from 5198705 to 5198995."""
     return gc.terrain.from_dem(rough(), TRANSFORM, crs="EPSG:32632")
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def plain() -> gc.terrain.Terrain:
     """Return level ground of 30 by 40 units, from 0.5 to 39.5 and to 29.5, of no CRS."""
     return gc.terrain.from_dem(np.zeros((30, 40)), (1, 0, 0, 0, -1, 30))

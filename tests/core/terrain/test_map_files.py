@@ -35,7 +35,7 @@ def utm_32(longitude: np.ndarray, latitude: np.ndarray) -> np.ndarray:
     return np.stack([500_000.0 + 0.9996 * radius * east, 0.9996 * radius * north], axis=1)
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def way(land: gc.terrain.Terrain) -> gc.CheapestPath:
     ends = land.locate_xy([[451_022.0, 5_198_933.0], [451_381.0, 5_198_718.0]])
     return gc.cheapest_path(land.mesh, *ends, (land.costs, gc.SlopeCost("tobler")))
@@ -132,6 +132,7 @@ def test_profiles_have_the_slopes_of_the_ground(
     assert len(round_trip.heights) == len(ring.points) + 1
 
 
+@pytest.mark.jit
 def test_isochrones_are_lines_of_equal_cost(plain: gc.terrain.Terrain) -> None:
     field = gc.cost_distance(plain.mesh, plain.locate_xy([20.0, 15.0]), 2.0 * plain.costs)
     (ring,), nothing = field.isochrones([12.0, 1e6])
