@@ -124,6 +124,8 @@ def bound_on(mesh: gc.TriangleMesh, request: Accuracy) -> Mapping[str, Any]:
     return bound_of(gc.error_bound(mesh, **options_of(request)))
 
 
-def stats_of(stats: gc.SweepStats) -> Mapping[str, Any]:
+def stats_of(stats: gc.SweepStats | None) -> Mapping[str, Any]:
     """Return the statistics that are the same in every run; seconds are in `Server-Timing`."""
+    if stats is None:
+        return {}
     return {name: value for name, value in stats.as_dict().items() if name != "seconds"}

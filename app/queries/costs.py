@@ -88,6 +88,10 @@ class CostsAsDistances:
         """Return what a point costs."""
         return self.field.cost_at(point)
 
+    def path_to(self, point: gc.SurfacePoint) -> gc.CheapestPath:
+        """Return the cheapest path."""
+        return self.field.path_to(point)
+
 
 def solve_costs(
     opened: OpenMesh, cost: SurfaceCost, sources: Sequence[gc.Source], context: ExecutionContext

@@ -144,7 +144,7 @@ class DistancesQuery(FromSources[DistancesRequest]):
             distances=distances,
             **(told(certificate, certificate.relative_gap) if certificate else {}),
             unreachable=_unreachable(mesh, sources, targets, distances),
-            stats={} if field.stats is None else stats_of(field.stats),
+            stats=stats_of(field.stats),
         )
         included: dict[str, Any] = {}
         if "nearest_source" in request.include:

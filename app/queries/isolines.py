@@ -1,4 +1,4 @@
-"""Lines of equal distance, or of equal value."""
+"""Lines of equal distance, of equal cost, or of equal value."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
@@ -23,6 +23,7 @@ from app.queries.cost_model import (
     faces_crossed,
     sweep_seconds,
 )
+from app.queries.costs import CHEAPEST, check_alone, solve_costs, sweeps_of
 from app.queries.from_sources import FromSources
 from app.queries.lines import (
     OFFERS,
@@ -45,7 +46,7 @@ from app.queries.validation import (
     naming,
 )
 from app.queries.views import lines_of
-from app.schemas.requests import IsolinesRequest
+from app.schemas.requests import IsolinesRequest, SurfaceCost
 from app.settings import Settings
 from app.store.meshes import OpenMesh
 
@@ -58,6 +59,7 @@ _OF_DISTANCES = (
     "absolute_error",
     "max_distance",
     "chord_error",
+    "cost",
 )
 """Members that do not go with values"""
 
@@ -88,6 +90,8 @@ class IsolinesQuery(FromSources[IsolinesRequest]):
             message = "give sources, or values" if are_missing else "give at least one source"
             raise invalid_fields(["/sources"], message)
         _refuse_levels_below_0(request)
+        if request.cost is not None:
+            check_alone(request, "chord_error")
         return with_default_accuracy(request)
 
     def check_limits(self, settings: Settings) -> None:
@@ -106,14 +110,18 @@ class IsolinesQuery(FromSources[IsolinesRequest]):
         crossed = PER_FACE_CROSSED * faces_crossed(faces, self._level_count, self.share)
         if request.values is not None:
             return PER_FACE_SCANNED * faces * self._level_count + crossed
-        return 2 * sweep_seconds(faces, request, self.share) + crossed
+        sweeps = 2.0 if request.cost is None else sweeps_of(request.cost)
+        return sweeps * sweep_seconds(faces, request, self.share) + crossed
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Draw level by level, as long as the lines fit into the answer."""
-        if self.request.values is None:
-            about, levels, drawn = self._of_distances(opened, points, context)
-        else:
+        request = self.request
+        if request.values is not None:
             about, levels, drawn = self._of_values(opened, context)
+        elif request.cost is not None:
+            about, levels, drawn = self._of_costs(opened, points, request.cost, context)
+        else:
+            about, levels, drawn = self._of_distances(opened, points, context)
         located = are_located(opened.mesh, self.request)
         found: list[dict[str, Any]] = []
         values = 0
@@ -139,10 +147,7 @@ class IsolinesQuery(FromSources[IsolinesRequest]):
             max_distance=self.request.max_distance,
             isolines=True,
         )
-        levels = self.request.levels
-        if levels is None:
-            with naming((gc.errors.InvalidArgument, "/count")):
-                levels = gc.spaced_levels(field.distances, self._level_count).tolist()
+        levels = self._levels_within(field.distances)
         about = {
             "method": self.request.method,
             "error_bound": bound_of(field.error_bound),
@@ -153,6 +158,27 @@ class IsolinesQuery(FromSources[IsolinesRequest]):
         drawn = field.each_isoline(levels, chord_error, **context.part(1, 2).options)
         return about, levels, drawn
 
+    def _of_costs(
+        self,
+        opened: OpenMesh,
+        points: SurfacePoints,
+        cost: SurfaceCost,
+        context: ExecutionContext,
+    ) -> Drawn:
+        """Sweep, and return the lines of the costs of vertices, which are straight in each face."""
+        starts = to_sources(opened.mesh, self.request.sources, points)
+        field = solve_costs(opened, cost, starts, context.part(0, 2))
+        levels = self._levels_within(field.distances)
+        about = {
+            "method": CHEAPEST,
+            "error_bound": bound_of(field.error_bound),
+            "chord_error": 0.0,
+            "sources": [describe_source(opened.mesh, start) for start in starts],
+            "stats": {},
+        }
+        costs = gc.ScalarField(opened.mesh, field.distances)
+        return about, levels, _straight_lines(costs, levels, context.part(1, 2))
+
     def _of_values(self, opened: OpenMesh, context: ExecutionContext) -> Drawn:
         """Return the lines of the values, which are straight in each face."""
         with naming((gc.errors.InvalidArgument, "/values")):
@@ -160,13 +186,6 @@ class IsolinesQuery(FromSources[IsolinesRequest]):
         levels = self.request.levels
         if levels is None:
             levels = _levels_between(field.values, self._level_count)
-
-        def drawn() -> Iterator[Sequence[gc.SurfaceCurve]]:
-            for i, level in enumerate(levels):
-                checkpoint(context.cancel)
-                yield field.isolines([level])[0]
-                context.progress((i + 1) / len(levels))
-
         about = {
             "method": "exact",
             "error_bound": CERTAIN,
@@ -174,12 +193,30 @@ class IsolinesQuery(FromSources[IsolinesRequest]):
             "sources": [],
             "stats": {},
         }
-        return about, levels, drawn()
+        return about, levels, _straight_lines(field, levels, context)
+
+    def _levels_within(self, distances: NDArray[np.float64]) -> list[float]:
+        """Return the levels, or as many between 0 and the largest distance."""
+        if self.request.levels is not None:
+            return self.request.levels
+        with naming((gc.errors.InvalidArgument, "/count")):
+            levels: list[float] = gc.spaced_levels(distances, self._level_count).tolist()
+        return levels
 
     @property
     def _level_count(self) -> int:
         request = self.request
         return len(request.levels) if request.levels is not None else request.count or 0
+
+
+def _straight_lines(
+    field: gc.ScalarField, levels: Sequence[float], context: ExecutionContext
+) -> Iterator[Sequence[gc.SurfaceCurve]]:
+    """Yield the lines of each level."""
+    for i, level in enumerate(levels):
+        checkpoint(context.cancel)
+        yield field.isolines([level])[0]
+        context.progress((i + 1) / len(levels))
 
 
 def _refuse_members_of_distances(request: IsolinesRequest) -> None:

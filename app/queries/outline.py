@@ -14,7 +14,8 @@ SHOWN = "points", "locations", "faces"
 
 def outline_of(path: gc.GeodesicPath | gc.CheapestPath) -> dict[str, Any]:
     """Return the members of a path."""
-    return {"status": "ok", **polyline_of(path), "error_bound": bound_of(path.error_bound)}
+    cost = {"cost": path.cost} if isinstance(path, gc.CheapestPath) else {}
+    return {"status": "ok", **polyline_of(path), **cost, "error_bound": bound_of(path.error_bound)}
 
 
 def polyline_of(path: gc.SurfaceCurve) -> dict[str, Any]:

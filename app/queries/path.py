@@ -144,7 +144,7 @@ class PathQuery(Query[PathRequest]):
                 )
         except gc.errors.NoPath as error:
             return self._answer(opened, points, no_outline(error.reason, ROUGHLY) | {"cost": None})
-        answer = self._answer(opened, points, {**outline_of(path), "cost": path.cost})
+        answer = self._answer(opened, points, outline_of(path))
         values = VALUES_OF_POINT * len(path.locations)
         return replace(answer, values=values, array=lambda: path.points)
 

@@ -13,6 +13,7 @@ from app.queries.accuracy import (
 )
 from app.queries.base import VALUES_OF_POINT, ExecutionContext, Query
 from app.queries.cost_model import PER_PATH, PER_POINT, share_reached, sweep_seconds
+from app.queries.costs import CHEAPEST, CostsAsDistances, check_alone, solve_costs, sweeps_of
 from app.queries.lines import OFFERS
 from app.queries.outline import no_outline, outline_of
 from app.queries.points import (
@@ -33,7 +34,7 @@ from app.store.meshes import OpenMesh
 
 
 class PathsQuery(Query[PathsRequest]):
-    """The shortest paths from a point to each of some targets."""
+    """The shortest or cheapest paths from a point to each of some targets."""
 
     kind = "paths"
     model = PathsRequest
@@ -42,7 +43,9 @@ class PathsQuery(Query[PathsRequest]):
 
     @classmethod
     def normalized(cls, request: PathsRequest) -> PathsRequest:
-        """Name error or effort."""
+        """Name error or effort; refuse what does not go with costs."""
+        if request.cost is not None:
+            check_alone(request)
         return with_default_accuracy(request)
 
     def value_count(self) -> int:
@@ -67,22 +70,17 @@ class PathsQuery(Query[PathsRequest]):
         """Return the cost of a sweep to the limit, and of the paths."""
         request = self.request
         share = share_reached(self.size, point_count(request.source), request.max_distance)
-        sweep = sweep_seconds(self.size.faces, request, share)
+        sweeps = 1.0 if request.cost is None else sweeps_of(request.cost)
+        sweep = sweeps * sweep_seconds(self.size.faces, request, share)
         return sweep + (PER_PATH + PER_POINT) * len(request.targets)
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep once, then trace path by path, as long as they fit into the answer."""
-        count = point_count(self.request.source)
+        request = self.request
+        count = point_count(request.source)
         starts, targets = points[:count], points[count:]
-        start = to_point_or_curve(opened.mesh, "/source", self.request.source, starts)
-        field = solve_field(
-            opened,
-            self.request,
-            [gc.Source(start)],
-            context,
-            max_distance=self.request.max_distance,
-            targets=targets,
-        )
+        start = to_point_or_curve(opened.mesh, "/source", request.source, starts)
+        field = self._field(opened, gc.Source(start), targets, context)
         found: list[dict[str, Any]] = []
         values = 0
         for target in targets:
@@ -90,7 +88,8 @@ class PathsQuery(Query[PathsRequest]):
             try:
                 path = field.path_to(target)
             except gc.errors.NoPath as error:
-                found.append(no_outline(error.reason, field.error_bound))
+                cost = {} if request.cost is None else {"cost": None}
+                found.append(no_outline(error.reason, field.error_bound) | cost)
                 continue
             values += VALUES_OF_POINT * len(path.locations)
             check_json_size(values, context.max_values, self.hint)
@@ -101,7 +100,7 @@ class PathsQuery(Query[PathsRequest]):
         ]
         members = self.members(
             opened,
-            method=self.request.method,
+            method=request.method if request.cost is None else CHEAPEST,
             source=describe_point_or_curve(opened.mesh, start),
             paths=paths,
             stats=stats_of(field.stats),
@@ -110,4 +109,23 @@ class PathsQuery(Query[PathsRequest]):
             members,
             shown=("paths",),
             lines=lambda: [line_of(path, i) for i, path in enumerate(found)],
+        )
+
+    def _field(
+        self,
+        opened: OpenMesh,
+        source: gc.Source,
+        targets: SurfacePoints,
+        context: ExecutionContext,
+    ) -> gc.DistanceField | CostsAsDistances:
+        request = self.request
+        if request.cost is not None:
+            return solve_costs(opened, request.cost, [source], context)
+        return solve_field(
+            opened,
+            request,
+            [source],
+            context,
+            max_distance=request.max_distance,
+            targets=targets,
         )

@@ -164,7 +164,7 @@ class IsolinesAnswer(BaseModel):
 
     kind: Literal["isolines"]
     mesh_id: str
-    method: Method
+    method: Method | Literal["cheapest"]
     error_bound: ErrorBound = Field(description="Error bound of the distance of each line")
     chord_error: float = Field(
         description="Largest distance of chords from the exact lines, in mesh units"
@@ -351,6 +351,9 @@ class Outline(BaseModel):
     )
     locations: list[Location] | None
     faces: list[int] | None = Field(description="The face of each segment of the path")
+    cost: float | None = Field(
+        default=None, description="With `cost`: what the path costs, which `error_bound` is about"
+    )
     error_bound: ErrorBound
 
 
@@ -366,9 +369,6 @@ class PathAnswer(Outline):
     kind: Literal["path"]
     mesh_id: str
     method: Method | Literal["cheapest"]
-    cost: float | None = Field(
-        default=None, description="With `cost`: what the path costs, which `error_bound` is about"
-    )
     source: ResolvedPoint
     target: ResolvedPoint
     waypoints: list[ResolvedPoint]
@@ -395,7 +395,7 @@ class PathsAnswer(BaseModel):
 
     kind: Literal["paths"]
     mesh_id: str
-    method: Method
+    method: Method | Literal["cheapest"]
     source: ResolvedPoint | ResolvedCurve
     paths: list[PathTo]
     stats: dict[str, Any]

@@ -256,6 +256,11 @@ class IsolinesRequest(Accuracy, AskingForLines):
         "inside faces, in mesh units. At least a billionth of the bounding box's diagonal; a "
         "thousandth of the mean edge length if not given",
     )
+    cost: SurfaceCost | None = Field(
+        default=None,
+        description="Draw lines of equal cost, such as isochrones, instead of equal distance; they "
+        "are straight in each face. What is about distances does not go with it",
+    )
 
 
 _CHORD_ERROR: Any = Field(
@@ -466,6 +471,11 @@ class PathsRequest(AccuracyOrEffort, AmongBarriers):
     targets: FailFastList[Point] = Field(min_length=1)
     max_distance: NonNegative | None = Field(
         default=None, description="Targets farther than this, in mesh units, have no path"
+    )
+    cost: SurfaceCost | None = Field(
+        default=None,
+        description="Find the cheapest paths instead of the shortest: from the source, or to it "
+        "where its `direction` is `to`. What is about distances does not go with it",
     )
 
 

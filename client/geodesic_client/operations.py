@@ -294,9 +294,13 @@ def paths(
     effort: Literal[1, 2, 4, 8] | None = None,
     max_distance: float | None = None,
     barriers: Sequence[int] = (),
+    cost: Mapping[str, Any] | None = None,
     progress: Progress = ignore_progress,
 ) -> Flow[list[Path]]:
-    """Return the shortest path from a source to each of the targets."""
+    """Return the shortest path from a source to each of the targets.
+
+    With ``cost``, as for `distances`, they are the cheapest.
+    """
     body = _body(
         source=source,
         targets=targets,
@@ -306,6 +310,7 @@ def paths(
         effort=effort,
         max_distance=max_distance,
         barriers=barriers,
+        cost=cost,
     )
     return (yield from _ask(mesh, "paths", body, to_paths, progress))
 
@@ -324,12 +329,14 @@ def isolines(
     chord_error: float | None = None,
     barriers: Sequence[int] = (),
     include: Sequence[Literal["locations"]] = (),
+    cost: Mapping[str, Any] | None = None,
     progress: Progress = ignore_progress,
 ) -> Flow[Isolines]:
     """Return the lines at some distances (``levels``), or at ``count`` evenly spaced ones.
 
     ``sources`` is a point, or several. In their place, ``values`` (V,) are your own: lines are at
-    levels of these, and end where a value is NaN or infinite.
+    levels of these, and end where a value is NaN or infinite. With ``cost``, as for `distances`,
+    lines are those of equal cost.
     """
     body = _body(
         sources=None if sources is None else as_points(sources),
@@ -342,6 +349,7 @@ def isolines(
         chord_error=chord_error,
         barriers=barriers,
         include=include,
+        cost=cost,
     )
     arrays = {} if values is None else {"values": np.asarray(values, np.float64)}
     request = _request(mesh, "isolines", body, JSON, arrays=arrays)

@@ -1531,11 +1531,8 @@ export interface components {
             kind: "isolines";
             /** Mesh Id */
             mesh_id: string;
-            /**
-             * Method
-             * @enum {string}
-             */
-            method: "exact" | "approximate" | "fast";
+            /** Method */
+            method: ("exact" | "approximate" | "fast") | "cheapest";
             /** @description Error bound of the distance of each line */
             error_bound: components["schemas"]["ErrorBound"];
             /**
@@ -1654,6 +1651,8 @@ export interface components {
              * @description Largest distance of the returned chords from the exact lines, which are arcs inside faces, in mesh units. At least a billionth of the bounding box's diagonal; a thousandth of the mean edge length if not given
              */
             chord_error?: number | null;
+            /** @description Draw lines of equal cost, such as isochrones, instead of equal distance; they are straight in each face. What is about distances does not go with it */
+            cost?: components["schemas"]["SurfaceCost"] | null;
         };
         /**
          * JobDocument
@@ -2551,6 +2550,11 @@ export interface components {
              * @description The face of each segment of the path
              */
             faces: number[] | null;
+            /**
+             * Cost
+             * @description With `cost`: what the path costs, which `error_bound` is about
+             */
+            cost?: number | null;
             error_bound: components["schemas"]["ErrorBound"];
             /** @description What the proof tells, if asked for by `certify`; `relative_gap` is that of the length */
             certificate?: components["schemas"]["Certificate"] | null;
@@ -2563,11 +2567,6 @@ export interface components {
             mesh_id: string;
             /** Method */
             method: ("exact" | "approximate" | "fast") | "cheapest";
-            /**
-             * Cost
-             * @description With `cost`: what the path costs, which `error_bound` is about
-             */
-            cost?: number | null;
             source: components["schemas"]["ResolvedPoint"];
             target: components["schemas"]["ResolvedPoint"];
             /** Waypoints */
@@ -2686,6 +2685,11 @@ export interface components {
              * @description The face of each segment of the path
              */
             faces: number[] | null;
+            /**
+             * Cost
+             * @description With `cost`: what the path costs, which `error_bound` is about
+             */
+            cost?: number | null;
             error_bound: components["schemas"]["ErrorBound"];
             target: components["schemas"]["ResolvedPoint"];
         };
@@ -2701,11 +2705,8 @@ export interface components {
             kind: "paths";
             /** Mesh Id */
             mesh_id: string;
-            /**
-             * Method
-             * @enum {string}
-             */
-            method: "exact" | "approximate" | "fast";
+            /** Method */
+            method: ("exact" | "approximate" | "fast") | "cheapest";
             /** Source */
             source: components["schemas"]["ResolvedPoint"] | components["schemas"]["ResolvedCurve"];
             /** Paths */
@@ -2774,6 +2775,8 @@ export interface components {
              * @description Targets farther than this, in mesh units, have no path
              */
             max_distance?: number | null;
+            /** @description Find the cheapest paths instead of the shortest: from the source, or to it where its `direction` is `to`. What is about distances does not go with it */
+            cost?: components["schemas"]["SurfaceCost"] | null;
         };
         /**
          * PositionPoint

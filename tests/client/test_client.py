@@ -147,6 +147,22 @@ def test_paths_are_the_library_s(service: Client, mesh: Mesh, same: gc.TriangleM
     assert other.reason is None
 
 
+def test_what_ways_cost_is_the_library_s(
+    service: Client, mesh: Mesh, same: gc.TriangleMesh
+) -> None:
+    cost, faces = {"faces": np.linspace(1.0, 3.0, len(same.faces)).tolist()}, len(same.faces)
+    field = gc.cost_distance(same, 3, np.linspace(1.0, 3.0, faces))
+    own = field.path_to(700)
+    found = service.distances(mesh, 3, cost=cost)
+    np.testing.assert_array_equal(found.distances, field.costs)
+    (path,) = service.paths(mesh, 3, [700], cost=cost)
+    assert (path.cost, path.length) == (own.cost, own.length)
+    assert service.path(mesh, 3, 700, cost=cost).cost == pytest.approx(own.cost)
+    (level,) = service.isolines(mesh, 3, levels=[0.5 * own.cost], cost=cost).levels
+    for line, expected in zip(level.lines, field.isochrones([level.level])[0], strict=True):
+        np.testing.assert_array_equal(line.points, expected.points)
+
+
 def test_a_mesh_is_cut_along_lines_of_answers(
     service: Client, mesh: Mesh, same: gc.TriangleMesh
 ) -> None:

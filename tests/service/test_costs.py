@@ -80,6 +80,59 @@ def test_paths_are_the_library_s(client: TestClient, hills: str, k: int) -> None
     assert npy.headers["geodesic-cost"] == repr(path.cost)
 
 
+@pytest.mark.parametrize("k", range(3))
+@pytest.mark.parametrize("direction", ["from", "to"])
+def test_paths_to_many_are_the_library_s(
+    client: TestClient, hills: str, k: int, direction: str
+) -> None:
+    mesh = stored_mesh(client, hills)
+    cost, given = known(mesh)[k]
+    detail = cost.get("detail", "default")
+    asked = cost | {"direction": direction, "max_cost": 1.5 * float(np.median(costs(mesh, k)))}
+    field = gc.cost_distance(mesh, 3, given, asked["max_cost"], direction=direction, detail=detail)
+    assert np.isfinite(field.costs).any()
+    assert np.isinf(field.costs).any()
+
+    body = {"source": 3, "targets": list(range(0, 250, 10)), "cost": asked}
+    answer = client.post(f"/v1/meshes/{hills}/paths", json=body).json()
+
+    assert answer["method"] == "cheapest"
+    for target, path in zip(body["targets"], answer["paths"], strict=True):
+        if np.isinf(field.costs[target]):
+            assert (path["status"], path["reason"]) == ("no_path", "beyond_max_cost")
+            assert (path["cost"], path["length"]) == (None, None)
+            continue
+        own = field.path_to(target)
+        assert (path["cost"], path["length"]) == (own.cost, own.length)
+        np.testing.assert_array_equal(path["points"], own.points)
+        assert path["error_bound"]["value"] == own.error_bound.value
+
+
+def costs(mesh: gc.TriangleMesh, k: int) -> np.ndarray:
+    found = gc.cost_distance(mesh, 3, known(mesh)[k][1]).costs
+    return found[np.isfinite(found)]
+
+
+@pytest.mark.parametrize("k", range(3))
+def test_lines_of_equal_cost_are_the_library_s(client: TestClient, hills: str, k: int) -> None:
+    mesh = stored_mesh(client, hills)
+    cost, given = known(mesh)[k]
+    field = gc.cost_distance(mesh, [3, 90], given, detail=cost.get("detail", "default"))
+
+    asked = {"sources": [3, 90], "cost": cost}
+    for levels in ({"count": 3}, {"levels": [float(np.median(costs(mesh, k)))]}):
+        answer = client.post(f"/v1/meshes/{hills}/isolines", json=asked | levels).json()
+        spaced = gc.spaced_levels(field.costs, 3).tolist()
+        assert [each["level"] for each in answer["isolines"]] == levels.get("levels", spaced)
+        assert (answer["method"], answer["chord_error"]) == ("cheapest", 0.0)
+        assert answer["error_bound"]["value"] == field.error_bound.value
+        for each in answer["isolines"]:
+            (own,) = field.isochrones([each["level"]])
+            assert len(each["lines"]) == len(own) > 0
+            for line, expected in zip(each["lines"], own, strict=True):
+                np.testing.assert_array_equal(line["points"], expected.points)
+
+
 def test_a_path_beyond_the_largest_cost_is_none(client: TestClient, hills: str) -> None:
     body = {"source": 3, "target": 200, "cost": {"slope": "naismith", "max_cost": 0.1}}
     answer = client.post(f"/v1/meshes/{hills}/path", json=body).json()
@@ -115,11 +168,24 @@ SLOPE = {"slope": "tobler"}
         ("path", {"cost": SLOPE, "waypoints": [7]}, "/waypoints"),
         ("path", {"cost": SLOPE, "method": "approximate"}, "/method"),
         ("path", {"cost": SLOPE | {"direction": "to"}}, "/cost/direction"),
+        ("paths", {"cost": SLOPE, "method": "fast"}, "/method"),
+        ("paths", {"cost": SLOPE, "max_distance": 1.0}, "/max_distance"),
+        ("paths", {"cost": {"faces": [1.0, 2.0]}}, "/cost/faces"),
+        ("isolines", {"cost": SLOPE, "chord_error": 0.1}, "/chord_error"),
+        ("isolines", {"cost": SLOPE, "method": "approximate"}, "/method"),
+        ("isolines", {"cost": SLOPE, "max_distance": 1.0}, "/max_distance"),
+        ("isolines", {"cost": SLOPE, "values": [1.0], "sources": []}, "/cost"),
+        ("isolines", {"cost": {"slope": "hilly"}}, "/cost/slope"),
     ],
 )
 def test_refused(client: TestClient, hills: str, operation: str, body: dict, place: str) -> None:
-    ends = {"sources": [3]} if operation == "distances" else {"source": 3, "target": 200}
-    refused = client.post(f"/v1/meshes/{hills}/{operation}", json=ends | body)
+    ends: dict[str, dict[str, Any]] = {
+        "distances": {"sources": [3]},
+        "isolines": {"sources": [3], "count": 3},
+        "path": {"source": 3, "target": 200},
+        "paths": {"source": 3, "targets": [200]},
+    }
+    refused = client.post(f"/v1/meshes/{hills}/{operation}", json=ends[operation] | body)
     problem = check_problem(refused, 422, "invalid_request")
     places = [fault["pointer"] for fault in problem["errors"]]
     assert any(each.startswith(place) for each in places), places
