@@ -4,9 +4,12 @@ Without it the wheel is pure, and kernels are compiled when they are first neede
 of ``geodesic_core.kernels.jit.machine``, separated by spaces.
 """
 
+import atexit
 import os
+import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +19,14 @@ PLATFORM = "manylinux_2_17_x86_64"
 """Compiled kernels call only arithmetic of the C library, which is in each glibc of that age."""
 LEVELS = os.environ.get("GEODESIC_WHEEL_LEVELS", "").split()
 COMPILE = """
-from geodesic_core import compile_kernels
+import sys
+from geodesic_core.compilation import WORKLOADS, compile_kernels
 from geodesic_core.kernels.jit import cache, machine
+if machine.best_target() != sys.argv[1]:
+    sys.exit(f"this machine cannot run kernels for {sys.argv[1]}, so it cannot compile them")
 compile_kernels()
-print(cache.folder_for(machine.best_target()))
+folder = cache.folder_for(sys.argv[1])
+print(folder if all(cache.is_complete(name, [folder]) for name in WORKLOADS) else "")
 """
 
 
@@ -46,13 +53,19 @@ class KernelsHook(BuildHookInterface[Any]):
 
 
 def compiled(root: Path, level: str) -> Path:
-    """Compile all kernels for a level, unless the user's cache has them; return their folder."""
+    """Compile all kernels for a level, unless the user's cache has them; return their folder.
+
+    Where that cache has them for this very processor, or for a lower level, nothing is missing from
+    it. They are then compiled in a folder of their own.
+    """
+    own = tempfile.mkdtemp()
+    atexit.register(shutil.rmtree, own, ignore_errors=True)  # once the wheel is written
     environment = os.environ | {"PYTHONPATH": str(root), "GEODESIC_CPU_LEVEL": level}
-    command = [sys.executable, "-c", COMPILE]
-    done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=True)  # noqa: S603
-    folder = Path(done.stdout.strip())
-    if not folder.name.endswith(level):
-        raise RuntimeError(
-            f"this machine cannot run kernels for {level}, so it cannot compile them"
+    command = [sys.executable, "-c", COMPILE, level]
+    for place in ({}, {"NUMBA_CACHE_DIR": own}):
+        done = subprocess.run(  # noqa: S603
+            command, env=environment | place, stdout=subprocess.PIPE, text=True, check=True
         )
-    return folder
+        if folder := done.stdout.strip():
+            return Path(folder)
+    raise RuntimeError(f"kernels for {level} are missing from {own}")

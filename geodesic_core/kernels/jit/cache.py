@@ -12,7 +12,7 @@ import hashlib
 import os
 import tempfile
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
@@ -195,9 +195,9 @@ def mark_complete(workload: str) -> None:
         (folder() / _mark_of(workload)).touch()
 
 
-def is_complete(workload: str) -> bool:
-    """Return whether all kernels of a workload are on disk."""
-    return any((place / _mark_of(workload)).exists() for place in folders())
+def is_complete(workload: str, places: Sequence[Path] | None = None) -> bool:
+    """Return whether one of some folders, by default all, has all kernels of a workload."""
+    return any((place / _mark_of(workload)).exists() for place in places or folders())
 
 
 def _mark_of(workload: str) -> str:
