@@ -6,6 +6,7 @@ has changed, so that no kernel knows of its spectators.
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL, Topology
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.sweep import continuous_dijkstra
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.validation import is_index
 
 MOST_FACES = 5000
 """Of a mesh whose sweep can be followed: some 100 000 windows, 10 MB"""
@@ -116,6 +118,9 @@ class SweepSteps:
     True
     """
 
+    most_faces: ClassVar[int] = MOST_FACES
+    """Of a mesh whose sweep can be followed."""
+
     mesh: TriangleMesh
     """The surface, with the barriers of the call."""
     windows: SweepWindows
@@ -158,15 +163,15 @@ def follow_sweep(question: Question, steps: int, control: Control) -> SweepSteps
         As in `WholeSweep.run_for`.
     """
     check_size(len(question.mesh.faces))
-    if not 1 <= steps <= MOST_STEPS:
-        raise InvalidArgument(f"steps must be from 1 to {MOST_STEPS}, not {steps}")
+    if not is_index(steps) or not 1 <= steps <= MOST_STEPS:
+        raise InvalidArgument(f"steps must be a whole number from 1 to {MOST_STEPS}, not {steps}")
     if question.has_curves:
         raise InvalidArgument("the steps of a sweep are those from points: a source is a curve")
-    sweep = ExactSweep(question)
-    unwatched = _Follower([NEVER])
+    sweep, vertices = ExactSweep(question), len(question.mesh.topology.total_angle)
+    unwatched = _Follower(vertices, [NEVER])
     sweep.run_for(control.for_part(0, 2), windows=sweep.all_faces, engine=unwatched.engine)
     work = [math.ceil(unwatched.work * (i / steps) ** PACE) for i in range(1, steps)]
-    follower = _Follower([*work, NEVER])
+    follower = _Follower(vertices, [*work, NEVER])
     wave = sweep.run_for(control.for_part(1, 2), windows=sweep.all_faces, engine=follower.engine)
     return follower.steps(question.mesh, wave)
 
@@ -183,7 +188,7 @@ def check_size(faces: int) -> None:
 class _Follower:
     """An engine of sweeps that pauses at given amounts of work, and notes what has changed."""
 
-    def __init__(self, ends: list[int]) -> None:
+    def __init__(self, vertices: int, ends: list[int]) -> None:
         self.engine = Engine(self._advance)
         self.work = 0
         self._ends = ends  # work at which each step ends, ascending
@@ -191,7 +196,7 @@ class _Follower:
         self._waiting: dict[bytes, int] = {}  # number of each window that waits, by what it is
         self._rows: list[bytes] = []
         self._life: list[tuple[int, int, int]] = []  # first, crossed, last
-        self._settled: Ints | None = None
+        self._settled = np.full(vertices, -1, np.int32)  # by inner vertex
         self._counts: list[tuple[float, int, int, int]] = []
 
     def _advance(
@@ -211,8 +216,6 @@ class _Follower:
 
     def _note(self, wave: Wavefront) -> None:
         step, vertices = len(self._counts), wave.vertices
-        if self._settled is None:
-            self._settled = np.full(len(vertices.status), -1, np.int32)
         has_left = vertices.status == SETTLED
         self._settled[has_left & (self._settled < 0)] = step
         front = vertices.distance[: len(has_left)][has_left].max(initial=0.0)
@@ -245,9 +248,8 @@ class _Follower:
 
     def steps(self, mesh: TriangleMesh, wave: Wavefront) -> SweepSteps:
         """Return what was noted, in the caller's numbers."""
-        inner, count = mesh.topology.inner_vertex, len(mesh.topology.total_angle)
+        inner = mesh.topology.inner_vertex
         fronts, created, crossed, waiting = zip(*self._counts, strict=True)
-        assert self._settled is not None  # noqa: S101 - a sweep has at least its start
         return SweepSteps(
             mesh,
             _as_columns(mesh.topology, self._rows, self._life),
@@ -255,7 +257,7 @@ class _Follower:
             np.array(created),
             np.array(crossed),
             np.array(waiting),
-            wave.vertices.distance[:count][inner],
+            wave.vertices.distance[inner],
             self._settled[inner],
         )
 

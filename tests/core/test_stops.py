@@ -73,6 +73,7 @@ SWEEPS = {
 }
 SWEEPS |= {
     "log map": lambda m, **watch: gc.log_map(m, INSIDE, x_axis=7, **watch),
+    "sweep steps": lambda m, **watch: gc.sweep_steps(m, INSIDE, 9, **watch).windows.d0,
     "cut": lambda m, **watch: gc.cut(m, crossing_chords(), **watch),
     "farthest points": lambda m, **watch: gc.farthest_points(m, 60, **watch).distances,
     "relaxed": lambda m, **watch: gc.relax_points(m, [INSIDE, 5, 900], 3, **watch).costs,
