@@ -1,7 +1,7 @@
 """The steps of an exact sweep: its windows, its front, its pseudosources."""
 
 import geodesic_core as gc
-from app.encoding import JSON, Answer
+from app.encoding import JSON, Answer, Indices
 from app.errors import problem
 from app.queries.base import ExecutionContext, Query
 from app.queries.cost_model import PER_WINDOW_FOLLOWED, sweep_seconds
@@ -11,7 +11,8 @@ from app.schemas.requests import Accuracy, SweepRequest
 from app.settings import Settings
 from app.store.meshes import OpenMesh
 
-_COLUMNS = "fronts", "created", "crossed", "waiting", "trimmed", "distances", "settled"
+_COUNTS = "created", "crossed", "waiting", "trimmed"
+_INDICES = "pseudosources", "crossed", "last"
 
 
 class SweepQuery(Query[SweepRequest]):
@@ -44,13 +45,16 @@ class SweepQuery(Query[SweepRequest]):
         """Follow the sweep, and tell all of it if that fits into the answer."""
         mesh = opened.mesh
         steps = gc.sweep_steps(mesh, points, self.request.steps, **context.options)
-        windows = vars(steps.windows)
-        values = len(windows) * len(steps.windows)
+        columns = vars(steps.windows)
+        values = len(columns) * len(steps.windows)
         check_json_size(values, context.max_values, self.hint)
         members = self.members(
             opened,
             sources=[describe_point(mesh, point) for point in points],
-            **{name: getattr(steps, name) for name in _COLUMNS},
-            windows=windows,
+            fronts=steps.fronts,
+            **{name: getattr(steps, name) for name in _COUNTS},
+            distances=steps.distances,
+            settled=Indices(steps.settled),
+            windows={**columns, **{name: Indices(columns[name]) for name in _INDICES}},
         )
         return Answer(members, values=values)

@@ -401,14 +401,16 @@ class SweepWindows(BaseModel):
     d0: list[float] = Field(description="Distance of `b0` from the pseudosource")
     d1: list[float] = Field(description="Distance of `b1`")
     sigma: list[float] = Field(description="Distance of the pseudosource from the source")
-    pseudosources: list[int] = Field(
-        description="The vertex that the rays come from; -1 for a source that is no vertex"
+    pseudosources: list[int | None] = Field(
+        description="The vertex that the rays come from; `null` for a source that is no vertex"
     )
     first: list[int] = Field(description="The step after which the window is there")
-    crossed: list[int] = Field(
-        description="The step in which it crosses its face, having waited in the queue; -1: never"
+    crossed: list[int | None] = Field(
+        description="The step in which it crosses its face, having waited in the queue"
     )
-    last: list[int] = Field(description="The step in which it is trimmed, or away; -1: never")
+    last: list[int | None] = Field(
+        description="The step in which trimming takes it away, or makes it shorter"
+    )
 
 
 class SweepAnswer(BaseModel):
@@ -425,7 +427,7 @@ class SweepAnswer(BaseModel):
     waiting: list[int] = Field(description="Windows that wait in the queue")
     trimmed: list[int] = Field(description="Windows trimmed away so far")
     distances: list[float | None] = Field(description="Of each vertex, `null` where unreachable")
-    settled: list[int] = Field(description="The step in which each vertex left the queue; -1: never")
+    settled: list[int | None] = Field(description="The step in which each vertex left the queue")
     windows: SweepWindows
     warnings: list[str]
 
