@@ -199,9 +199,7 @@ class _Follower:
         self._settled = np.full(vertices, -1, np.int32)  # by inner vertex
         self._counts: list[tuple[float, int, int, int]] = []
 
-    def _advance(
-        self, topology: Topology, wave: Wavefront, bounds: Bounds, budget: int
-    ) -> Outcome:
+    def _advance(self, topology: Topology, wave: Wavefront, bounds: Bounds, budget: int) -> Outcome:
         if not self._counts:
             self._note(wave)
         left = max(min(self._ends[0] - self.work, budget), 1)

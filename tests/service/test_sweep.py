@@ -37,7 +37,9 @@ def test_the_steps_are_the_library_s(client: TestClient, terrain: str) -> None:
     assert None in found["distances"], "inside the walls"
 
 
-def test_what_cannot_be_followed_is_refused(client: TestClient, terrain: str, tmp_path: Path) -> None:
+def test_what_cannot_be_followed_is_refused(
+    client: TestClient, terrain: str, tmp_path: Path
+) -> None:
     large = upload_sample(client, "sphere", 20_000)
     problem = check_problem(
         client.post(f"/v1/meshes/{large}/sweep", json={"sources": [0]}), 422, "limit_exceeded"

@@ -54,9 +54,7 @@ def test_windows_give_the_exact_distances_on_edges_and_never_less(name: str) -> 
     windows = steps.windows
     ends = list(zip(windows.tails.tolist(), windows.heads.tolist(), strict=True))
     at = np.array([middles[frozenset(pair)] for pair in ends])
-    lengths = np.linalg.norm(
-        case.vertices[windows.heads] - case.vertices[windows.tails], axis=1
-    )
+    lengths = np.linalg.norm(case.vertices[windows.heads] - case.vertices[windows.tails], axis=1)
     values = values_at_middles(windows, lengths)
 
     assert (values >= oracle[at] - ROUNDING * scale).all(), "of windows that are trimmed as well"
@@ -164,7 +162,9 @@ def test_pseudosources_are_saddles_and_vertices_of_the_boundary() -> None:
         (gc.Curve([0, 1]), 5, "a source is a curve"),
     ],
 )
-def test_steps_that_cannot_be_are_refused(sources: gc.Curve | int, steps: int, message: str) -> None:
+def test_steps_that_cannot_be_are_refused(
+    sources: gc.Curve | int, steps: int, message: str
+) -> None:
     with pytest.raises(InvalidArgument, match=message):
         gc.sweep_steps(gc.samples.plane(8), sources, steps)
 

@@ -21,6 +21,8 @@ export class Film {
   readonly deeds: Deed[];
   /** Vertices that send out windows, in the order in which they did so first. */
   readonly emitters = new Map<number, number>();
+  /** The step in which the last window of each such vertex leaves the queue. */
+  readonly active = new Map<number, number>();
   readonly largest: number;
 
   constructor(readonly sweep: SweepAnswer) {
@@ -49,7 +51,7 @@ export class Film {
   }
 
   private noteWindows(): void {
-    const { first, crossed, pseudosources, tails, heads, faces } = this.sweep.windows;
+    const { first, crossed, last, pseudosources, tails, heads, faces } = this.sweep.windows;
     const edges = this.deeds.map(() => new Set<string>());
     first.forEach((step, i) => {
       const vertex = pseudosources[i];
@@ -58,10 +60,14 @@ export class Film {
         this.deeds[step]?.lit.push(vertex);
       }
       const passed = crossed[i];
+      if (vertex != null) {
+        const left = passed ?? last[i] ?? this.last;
+        this.active.set(vertex, Math.max(left, this.active.get(vertex) ?? 0));
+      }
       if (passed == null) return;
       edges[passed]?.add(`${tails[i]} ${heads[i]} ${faces[i]}`);
       const deed = this.deeds[passed];
-      // A window that came and crossed within one step counts too, where there are several edges.
+      // Where a step is more than one operation, windows that came and crossed in it count as well.
       if (passed === step && deed) deed.shortened += 1;
     });
     for (const [step, deed] of this.deeds.entries()) deed.edges = edges[step]?.size ?? 0;
@@ -126,10 +132,13 @@ function crossing({ crossed, created, trimmed, shortened }: Deed): string {
 }
 
 function several({ settled, lit, crossed, created, trimmed }: Deed): string {
-  const popped = `${count(settled.length, "vertex", "vertices")} popped`;
-  const bent = lit.length > 0 ? `, ${count(lit.length, "new pseudosource")}` : "";
-  return (
-    `Pop (3.4): ${popped}${bent}. Propagate (3.2): ${count(crossed, "window")} across faces, ` +
-    `${created.toLocaleString("en")} new. Intersect (3.3): ${trimmed.toLocaleString("en")} trimmed away.`
-  );
+  const bends = lit.length > 0 ? `, ${count(lit.length, "new pseudosource")}` : "";
+  const popped = `Pop (3.4): ${count(settled.length, "vertex", "vertices")}${bends}.`;
+  const onward = `Propagate (3.2): ${count(crossed, "window")}, ${created.toLocaleString("en")} new beyond.`;
+  const cut = `Intersect (3.3): ${trimmed.toLocaleString("en")} trimmed away.`;
+  return [
+    ...(settled.length > 0 ? [popped] : []),
+    ...(crossed > 0 || created > 0 ? [onward] : []),
+    ...(trimmed > 0 ? [cut] : []),
+  ].join(" ");
 }

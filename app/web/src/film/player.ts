@@ -2,6 +2,7 @@
 import { askSweep } from "../api/queries";
 import { byId } from "../dom";
 import { InputError } from "../inputError";
+import { foldOnPhone } from "../panel/appearance";
 import { type State, type Store, unitOf } from "../state/state";
 import type { Status } from "../status";
 import { type Rgb, territory } from "../view/colours";
@@ -14,9 +15,13 @@ import { record } from "./recording";
 /** What the service follows at most; it refuses more. */
 const MOST_FACES = 5000;
 const STEPS = 240;
+/** Faces up to which pseudosources are drawn as long as their windows wait. */
+const FEW_FACES = 1000;
 /** Steps in which a new pseudosource is drawn larger. */
 const GLOW = 6;
-const SOURCE: Rgb = [0.16, 0.68, 0.62];
+const SOURCE: Rgb = [0.09, 0.22, 0.38];
+/** Of pseudosources, in turn: none that is like the front, or like what is trimmed. */
+const COLOURS = [1, 2, 6, 4].map(territory);
 const POPPED: Rgb = [1, 0.8, 0.1];
 
 export class Player {
@@ -27,7 +32,6 @@ export class Player {
   private readonly windows: WindowLayer;
   private readonly marks: Markers;
   private readonly slider = byId("film-step", HTMLInputElement);
-  private readonly panel = byId("film", HTMLDetailsElement);
 
   constructor(
     private readonly store: Store,
@@ -108,9 +112,9 @@ export class Player {
   }
 
   private setOpen(isOpen: boolean): void {
-    byId("film-start").hidden = byId("film-note").hidden = isOpen;
-    byId("film-controls").hidden = byId("film-caption").hidden = !isOpen;
-    if (isOpen) this.panel.open = true;
+    byId("player").hidden = !isOpen;
+    byId("film-save", HTMLButtonElement).disabled = !isOpen;
+    if (isOpen) foldOnPhone();
   }
 
   private play(): void {
@@ -149,8 +153,7 @@ export class Player {
     const step = this.slider.valueAsNumber;
     const { settled, distances } = film.sweep;
     const isReached = (v: number): boolean => (settled[v] ?? Infinity) <= step;
-    surface.setTerritories(null);
-    surface.setValues(
+    surface.setReached(
       distances.map((distance, v) => (isReached(v) ? (distance ?? -1) : -1)),
       film.largest,
     );
@@ -168,12 +171,16 @@ export class Player {
     const { mesh } = sceneView;
     if (!film || !mesh) return;
     const at = (vertex: number) => mesh.drawn(mesh.vertex(vertex));
+    const isSmall = mesh.document.faces <= FEW_FACES;
+    const stays = (vertex: number) => isSmall && (film.active.get(vertex) ?? 0) >= step;
     const lit = film.deeds.slice(0, step + 1).flatMap(({ lit }, then) =>
-      lit.map((vertex) => ({
-        position: at(vertex),
-        fill: this.colourOf(vertex),
-        size: step - then < GLOW ? 17 - 1.5 * (step - then) : 7,
-      })),
+      lit
+        .filter((vertex) => step - then < GLOW || stays(vertex))
+        .map((vertex) => ({
+          position: at(vertex),
+          fill: this.colourOf(vertex),
+          size: Math.max(19 - 1.5 * (step - then), 10),
+        })),
     );
     const { settled } = film.deeds[step] ?? { settled: [] };
     const popped = settled.length === 1 ? settled : [];
@@ -181,11 +188,13 @@ export class Player {
     this.marks.show([...lit, ...marks]);
   }
 
-  /** The source is teal, and pseudosources have colours in turn. */
+  /** The source has a colour of its own, and pseudosources have colours in turn. */
   private colourOf(vertex: number | null): Rgb {
     const { film } = this;
     const isSource = film?.sweep.sources.some((source) => source.vertex === vertex) ?? true;
-    return vertex === null || isSource ? SOURCE : territory(film?.emitters.get(vertex) ?? 0);
+    return vertex === null || isSource
+      ? SOURCE
+      : (COLOURS[(film?.emitters.get(vertex) ?? 0) % COLOURS.length] ?? SOURCE);
   }
 
   private save(): void {

@@ -29,7 +29,7 @@ export async function record(
   try {
     for (let step = 0; step <= last; step++) {
       const words = frame(step);
-      stage.renderNow();
+      await stage.drawn(); // a moment later the canvas could not be read any more
       draw(context, stage.canvas, words, ratio);
       await new Promise((resolve) => setTimeout(resolve, step === last ? LINGER_MS : pause));
       signal.throwIfAborted();

@@ -15,13 +15,13 @@ import type { Stage } from "./scene";
 /** Steps in which a trimmed window fades. */
 const FADING = 6;
 /** Depth of a ribbon, as a share of the way from its edge to the centre of the face. */
-const DEPTH = 0.42;
+const DEPTH = 0.6;
 const NEVER = 1e9;
 
-/** Colours that the caption names: of windows that wait, cross a face, and are trimmed. */
-export const FRONT: Rgb = [1, 0.8, 0.1];
-export const CROSSING: Rgb = [1, 1, 1];
-export const TRIMMED: Rgb = [0.95, 0.1, 0.15];
+/** Colours that the page names below the film: of windows that wait, cross a face, and are trimmed. */
+const FRONT: Rgb = [1, 0.8, 0.1];
+const CROSSING: Rgb = [0.525, 0.15, 0.92];
+const TRIMMED: Rgb = [0.95, 0.1, 0.15];
 
 // Ribbons of the three edges of a face share it out, and never overlap: each is cut along the lines
 // from the corners to the centre.
