@@ -680,7 +680,7 @@ def sweep_steps(
     deadline_s: float | None = None,
     memory_limit: int | None = None,
 ) -> SweepSteps:
-    """Return what the exact sweep does, step by step: windows, front and pseudosources (3.2 to 3.4).
+    """Return what the exact sweep does, step by step: windows, front, pseudosources (3.2 to 3.4).
 
     It is the sweep of `exact_distance` itself, to the bit, stopped between its steps: to teach it,
     to draw it, and to look into it. The first steps are one operation each, a vertex that leaves

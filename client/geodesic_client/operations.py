@@ -38,8 +38,8 @@ from geodesic_client.answers import (
     Step,
     StoredMatrix,
     StraightLine,
-    Sweep,
     SurfaceLine,
+    Sweep,
     to_array,
     to_borders,
     to_boundaries,
@@ -61,8 +61,8 @@ from geodesic_client.answers import (
     to_paths,
     to_samples,
     to_steps,
-    to_sweep,
     to_stored_matrix,
+    to_sweep,
 )
 from geodesic_client.flow import (
     Flow,

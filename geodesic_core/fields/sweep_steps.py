@@ -10,7 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from geodesic_core.arrays import Flags, Floats, Ints, Longs
+from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument
 from geodesic_core.fields.question import Question
@@ -296,7 +296,7 @@ def _as_columns(
     keys = np.frombuffer(b"".join(rows), _KEY)
     b0, b1, sx, sy, sigma = (column.copy() for column in keys["numbers"].T)
     half_edges, roots = keys["half_edge"], keys["root"]
-    is_vertex: Flags = roots < len(topology.outer_vertex)
+    is_vertex = roots < len(topology.outer_vertex)
     pseudosources = np.full(len(keys), -1, np.int32)
     pseudosources[is_vertex] = topology.outer_vertex[roots[is_vertex]]
     first, crossed, last = np.array(life, np.int32).reshape(-1, 3).T.copy()
