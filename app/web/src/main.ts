@@ -48,7 +48,10 @@ const routes = new Routes(status, sceneView, notes);
 const meshes = new Meshes(store, status);
 const controls = new Controls(store, status, sceneView, notes);
 const exportPanel = new ExportPanel(store, status, stage);
-const player = new Player(store, status, sceneView, () => fields.paint(store.state));
+const player = new Player(store, status, sceneView, () => {
+  fields.paint(store.state);
+  void showWires(store.state);
+});
 const pointer = new Pointer(sceneView, store, () => controls.tool);
 pointer.onHover = (point) => fields.tell(point, store.state);
 listenToKeys(store, status, sceneView, pointer);

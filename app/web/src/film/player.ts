@@ -19,6 +19,9 @@ const STEPS = 240;
 const FEW_FACES = 1000;
 /** Steps in which a new pseudosource is drawn larger. */
 const GLOW = 6;
+const KEY =
+  "Yellow waits in the queue, violet is propagated now, dark blue is done and comes from the source, " +
+  "other colours come from pseudosources, red is trimmed.";
 const SOURCE: Rgb = [0.09, 0.22, 0.38];
 /** Of pseudosources, in turn: none that is like the front, or like what is trimmed. */
 const COLOURS = [1, 2, 6, 4].map(territory);
@@ -89,6 +92,7 @@ export class Player {
       signal.throwIfAborted();
       this.film = new Film(sweep);
       this.sceneView.stage.showsLines = false;
+      void this.sceneView.surface?.setWireframe(true, [1, 1, 1]);
       this.windows.take(this.sceneView.mesh, sweep.windows, (v) => this.colourOf(v));
       this.slider.max = String(this.film.last);
       this.slider.value = "0";
@@ -209,7 +213,8 @@ export class Player {
         this.slider.value = String(step);
         this.show();
         onProgress(step / until);
-        return [film.words(step, unitOf(this.store.state)), film.counts(step, "")];
+        const unit = unitOf(this.store.state);
+        return [film.words(step, unit), film.counts(step, unit), KEY];
       };
       await record(this.sceneView.stage, until, this.pause_ms, frame, stop.signal).catch(
         (error: unknown) => {

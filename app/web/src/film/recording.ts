@@ -2,7 +2,7 @@
 import { download } from "../dom";
 import type { Stage } from "../view/scene";
 
-const HEIGHT = 96; // of the caption, in pixels of the canvas at a ratio of 1
+const HEIGHT = 136; // of the caption, in pixels of the canvas at a ratio of 1
 const FONT = 15;
 /** How long the last step is shown. */
 const LINGER_MS = 1500;
