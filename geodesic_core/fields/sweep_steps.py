@@ -5,7 +5,9 @@ has changed, so that no kernel knows of its spectators.
 """
 
 import math
+from collections import defaultdict
 from dataclasses import dataclass
+from itertools import chain
 from typing import ClassVar
 
 import numpy as np
@@ -185,6 +187,10 @@ def check_size(faces: int) -> None:
         )
 
 
+_Numbers = defaultdict[bytes, list[int]]
+"""Numbers of windows by what they are; two may be the same, until one is trimmed away"""
+
+
 class _Follower:
     """An engine of sweeps that pauses at given amounts of work, and notes what has changed."""
 
@@ -193,7 +199,7 @@ class _Follower:
         self.work = 0
         self._ends = ends  # work at which each step ends, ascending
         self._retained = 0  # rows that are known
-        self._waiting: dict[bytes, int] = {}  # number of each window that waits, by what it is
+        self._waiting: _Numbers = defaultdict(list)  # of the windows that wait
         self._rows: list[bytes] = []
         self._life: list[tuple[int, int, int]] = []  # first, crossed, last
         self._settled = np.full(vertices, -1, np.int32)  # by inner vertex
@@ -226,18 +232,20 @@ class _Follower:
         self._note_windows(step, crossed, waiting)
 
     def _note_windows(self, step: int, crossed: list[bytes], waiting: list[bytes]) -> None:
+        before, self._waiting = self._waiting, defaultdict(list)
         for key in crossed:
-            number = self._waiting.pop(key, None)
-            if number is None:
-                self._begin(key, (step, step, -1))
+            if before[key]:
+                self._end(before[key].pop(), crossed=step)
             else:
-                self._life[number] = (self._life[number][0], step, -1)
-        before, self._waiting = self._waiting, {}
+                self._begin(key, (step, step, -1))
         for key in waiting:
-            number = before.pop(key, None)
-            self._waiting[key] = self._begin(key, (step, -1, -1)) if number is None else number
-        for number in before.values():
-            self._life[number] = (self._life[number][0], -1, step)
+            number = before[key].pop() if before[key] else self._begin(key, (step, -1, -1))
+            self._waiting[key].append(number)
+        for number in chain.from_iterable(before.values()):
+            self._end(number, last=step)
+
+    def _end(self, number: int, crossed: int = -1, last: int = -1) -> None:
+        self._life[number] = (self._life[number][0], crossed, last)
 
     def _begin(self, key: bytes, life: tuple[int, int, int]) -> int:
         self._rows.append(key)

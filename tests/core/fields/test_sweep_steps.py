@@ -13,7 +13,15 @@ from tests.support import zoo
 from tests.support.oracles import unfolding
 
 CASES = zoo.SMALL | zoo.IRREGULAR
-NAMES = ["hills", "crags_with_holes", "cube_in_fours", "saddle_cone", "pinched_cubes", "book_of_3"]
+NAMES = [
+    "hills",
+    "crags_with_holes",
+    "obstacles",
+    "cube_in_fours",
+    "saddle_cone",
+    "pinched_cubes",
+    "book_of_3",
+]
 ROUNDING = 1e-9
 """Of a distance, as a share of the largest"""
 
