@@ -10,6 +10,7 @@ from playwright.sync_api import expect
 
 import geodesic_core as gc
 from tests.page.conftest import sample
+from tests.support.paths import ROOT
 from tests.support.viewing import View
 from tests.support.waiting import LONG_S
 
@@ -65,6 +66,17 @@ def test_it_plays_pauses_and_shows_each_step_of_the_library_s(view: View, servic
     assert len(told) == 4
     assert has_front == {0: False, 1: True, last // 2: True, last: False}
     assert "The queue is empty" in view.text("#film-words")
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_no_fault_of_access(view: View, service: str, theme: str) -> None:
+    view.page.emulate_media(color_scheme="dark" if theme == "dark" else "light")
+    show(view, sample(service, "terrain", 200), 40)
+    view.page.click("#film-play")
+    scrub(view, 30)
+    view.page.evaluate((ROOT / "app/web/node_modules/axe-core/axe.min.js").read_text())
+    found = view.page.evaluate("axe.run()")
+    assert [(each["id"], each["nodes"][0]["html"][:120]) for each in found["violations"]] == []
 
 
 def test_another_question_ends_it(view: View, service: str) -> None:
