@@ -194,7 +194,7 @@ def _large(runs: int) -> Section:
 
 
 def _pixels(source: int) -> Floats:
-    from skimage.graph import MCP_Geometric  # type: ignore[import-not-found]  # noqa: PLC0415
+    from skimage.graph import MCP_Geometric  # noqa: PLC0415
 
     search = MCP_Geometric(np.ones((SIDE, SIDE)))
     costs: Floats = search.find_costs([divmod(source, SIDE)])[0].ravel()

@@ -32,6 +32,7 @@ from geodesic_core.fields.scalar_field import ScalarField
 from geodesic_core.fields.stored_field import load_field
 from geodesic_core.fields.straight_lines import StraightLine
 from geodesic_core.fields.sweep_result import Retain, SweepStats
+from geodesic_core.fields.sweep_steps import SweepSteps, SweepWindows
 from geodesic_core.io.as_mesh import as_mesh
 from geodesic_core.io.label import load_label, load_label_vertices
 from geodesic_core.io.load import load_mesh
@@ -70,6 +71,7 @@ from geodesic_core.solvers import (
     shortest_loop,
     shortest_path,
     straighten,
+    sweep_steps,
     trace,
 )
 from geodesic_core.tolerances import WEIGHT_ERROR
@@ -109,6 +111,8 @@ __all__ = [
     "SurfaceCurve",
     "SurfacePoint",
     "SweepStats",
+    "SweepSteps",
+    "SweepWindows",
     "TangentFrames",
     "TriangleMesh",
     "approximate_distance",
@@ -142,6 +146,7 @@ __all__ = [
     "shortest_path",
     "spaced_levels",
     "straighten",
+    "sweep_steps",
     "terrain",
     "trace",
     "walled_in",

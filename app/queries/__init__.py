@@ -32,6 +32,7 @@ from app.queries.path import PathQuery, naming_parameters, written_request
 from app.queries.paths import PathsQuery
 from app.queries.samples import SamplesQuery
 from app.queries.steps import StepsQuery
+from app.queries.sweep import SweepQuery
 from app.queries.trace import TraceQuery
 from app.queries.validation import MeshSize, check_lengths
 
@@ -41,6 +42,7 @@ KINDS: Mapping[str, type[Query[Any]]] = {
         DistancesQuery,
         PathQuery,
         StepsQuery,
+        SweepQuery,
         PathsQuery,
         IsolinesQuery,
         BordersQuery,
@@ -82,6 +84,7 @@ __all__ = [
     "Query",
     "SamplesQuery",
     "StepsQuery",
+    "SweepQuery",
     "TraceQuery",
     "Unwritten",
     "check_lengths",

@@ -38,6 +38,8 @@ PER_FACE_STORED = 3e-6
 """To make a mesh and to store it: for each of its faces."""
 PER_FACE_CERTIFIED = 30e-6
 """To prove distances and to measure paths to all vertices: for each face, however few are swept."""
+PER_WINDOW_FOLLOWED = 2e-6
+"""To tell the steps of windows: for each of n√n, of n faces."""
 PER_PATH = 0.3e-3
 """To trace a path, and to describe it."""
 DIRECTED = 1.1

@@ -384,6 +384,54 @@ class StepsAnswer(BaseModel):
     warnings: list[str]
 
 
+class SweepWindows(BaseModel):
+    """Windows as columns: stretches of edges to which one pseudosource sends straight rays.
+
+    A window that trimming makes shorter ends, and what is left begins as another one.
+    """
+
+    tails: list[int] = Field(description="The vertex from where `b0` and `b1` are measured")
+    heads: list[int] = Field(description="The vertex at the other end of the edge")
+    faces: list[int] = Field(
+        description="The face that the window is about to cross, or has crossed; its rays come "
+        "from the other side of the edge"
+    )
+    b0: list[float] = Field(description="Where it begins on the edge, in mesh units")
+    b1: list[float] = Field(description="Where it ends")
+    d0: list[float] = Field(description="Distance of `b0` from the pseudosource")
+    d1: list[float] = Field(description="Distance of `b1`")
+    sigma: list[float] = Field(description="Distance of the pseudosource from the source")
+    pseudosources: list[int | None] = Field(
+        description="The vertex that the rays come from; `null` for a source that is no vertex"
+    )
+    first: list[int] = Field(description="The step after which the window is there")
+    crossed: list[int | None] = Field(
+        description="The step in which it crosses its face, having waited in the queue"
+    )
+    last: list[int | None] = Field(
+        description="The step in which trimming takes it away, or makes it shorter"
+    )
+
+
+class SweepAnswer(BaseModel):
+    """What an exact sweep does, step by step. Step 0 is the start; columns have a row for each."""
+
+    kind: Literal["sweep"]
+    mesh_id: str
+    sources: list[ResolvedPoint]
+    fronts: list[float] = Field(
+        description="Distance of the farthest vertex that has left the queue, in mesh units"
+    )
+    created: list[int] = Field(description="Windows created so far")
+    crossed: list[int] = Field(description="Windows that have crossed a face so far")
+    waiting: list[int] = Field(description="Windows that wait in the queue")
+    trimmed: list[int] = Field(description="Windows trimmed away so far")
+    distances: list[float | None] = Field(description="Of each vertex, `null` where unreachable")
+    settled: list[int | None] = Field(description="The step in which each vertex left the queue")
+    windows: SweepWindows
+    warnings: list[str]
+
+
 class PathTo(Outline):
     """The path to one of several targets."""
 

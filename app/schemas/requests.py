@@ -458,6 +458,19 @@ class StepsRequest(Stops):
     """The steps of the search for the exact path."""
 
 
+class SweepRequest(AmongBarriers):
+    """The exact sweep from ``sources``, step by step, on a mesh of at most 5000 faces."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"sources": [{"vertex": 0}], "steps": 20}]}
+    )
+
+    sources: FailFastList[Point] = Field(min_length=1)
+    steps: Annotated[StrictInt, Field(ge=1, le=1000)] = Field(
+        default=200, description="At most this many, of even pace but for the first"
+    )
+
+
 class PathsRequest(AccuracyOrEffort, AmongBarriers):
     """The shortest paths from ``source`` to each of ``targets``."""
 

@@ -25,6 +25,7 @@ from geodesic_client.answers import (
     Step,
     StoredMatrix,
     StraightLine,
+    Sweep,
 )
 from geodesic_client.async_client import AsyncClient
 from geodesic_client.bars import progress_bar
@@ -61,6 +62,7 @@ __all__ = [
     "Step",
     "StoredMatrix",
     "StraightLine",
+    "Sweep",
     "UnreachableError",
     "curve",
     "edge",

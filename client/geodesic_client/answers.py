@@ -305,6 +305,28 @@ class LogMap:
 
 
 @dataclass(frozen=True)
+class Sweep:
+    """What an exact sweep does, step by step; S is the number of steps, with the start."""
+
+    fronts: Floats
+    """(S,), distance of the farthest vertex that has left the queue, mesh units"""
+    created: Integers
+    """(S,), windows created so far"""
+    crossed: Integers
+    """(S,), windows that have crossed a face so far"""
+    waiting: Integers
+    """(S,), windows that wait in the queue"""
+    trimmed: Integers
+    """(S,), windows trimmed away so far"""
+    distances: Floats
+    """(V,), infinite where unreachable"""
+    settled: Integers
+    """(V,), step in which each vertex left the queue; −1 for never"""
+    windows: Mapping[str, Floats | Integers]
+    """Columns by name, as the interface document tells, ``tails`` to ``last``; −1 for none"""
+
+
+@dataclass(frozen=True)
 class StraightLine:
     """A straightest line."""
 
@@ -592,6 +614,24 @@ def to_log_map(response: httpx2.Response) -> LogMap:
     )
 
 
+def to_sweep(response: httpx2.Response) -> Sweep:
+    """Return the steps of a sweep, from JSON."""
+    document = response.json()
+    columns = {name: document[name] for name in ("created", "crossed", "waiting", "trimmed")}
+    windows = document["windows"].items()
+    lengths = ("b0", "b1", "d0", "d1", "sigma")
+    return Sweep(
+        fronts=np.array(document["fronts"], np.float64),
+        **{name: np.array(column, np.int64) for name, column in columns.items()},
+        distances=_with_infinity(document["distances"]),
+        settled=_indices(document["settled"]),
+        windows={
+            name: np.array(column, np.float64) if name in lengths else _indices(column)
+            for name, column in windows
+        },
+    )
+
+
 def to_lines(response: httpx2.Response) -> list[StraightLine]:
     """Return straightest lines, from JSON."""
     return [_to_line(each) for each in response.json()["lines"]]
@@ -642,6 +682,10 @@ def _members_of_headers(response: httpx2.Response) -> dict[str, Any]:
             member = name.removeprefix("geodesic-").replace("-", "_")
             members[member] = json.loads(value) if value[:1] in "[{" else value
     return members
+
+
+def _indices(values: Sequence[int | None]) -> Integers:
+    return np.array([-1 if each is None else each for each in values], np.int64)
 
 
 def _with_infinity(values: Sequence[float | None]) -> Floats:

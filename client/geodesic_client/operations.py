@@ -39,6 +39,7 @@ from geodesic_client.answers import (
     StoredMatrix,
     StraightLine,
     SurfaceLine,
+    Sweep,
     to_array,
     to_borders,
     to_boundaries,
@@ -61,6 +62,7 @@ from geodesic_client.answers import (
     to_samples,
     to_steps,
     to_stored_matrix,
+    to_sweep,
 )
 from geodesic_client.flow import (
     Flow,
@@ -81,6 +83,7 @@ Kind = Literal[
     "distances",
     "path",
     "path/steps",
+    "sweep",
     "paths",
     "isolines",
     "borders",
@@ -281,6 +284,19 @@ def path_steps(
         barriers=barriers,
     )
     return (yield from _ask(mesh, "path/steps", body, to_steps, progress))
+
+
+def sweep_steps(
+    mesh: Mesh | str,
+    sources: Point | Sequence[Point],
+    steps: int = 200,
+    *,
+    barriers: Sequence[int] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[Sweep]:
+    """Return the windows of an exact sweep, step by step, on a mesh of at most 5000 faces."""
+    body = _body(sources=as_points(sources), steps=steps, barriers=barriers)
+    return (yield from _ask(mesh, "sweep", body, to_sweep, progress))
 
 
 def paths(
@@ -814,6 +830,7 @@ class Operations:
     distances = Method(distances)
     path = Method(path)
     path_steps = Method(path_steps)
+    sweep_steps = Method(sweep_steps)
     paths = Method(paths)
     isolines = Method(isolines)
     borders = Method(borders)

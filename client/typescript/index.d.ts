@@ -68,6 +68,28 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/meshes/{mesh_id}/sweep": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * The windows of an exact sweep, step by step, on a mesh of at most 5000 faces
+         * @description Return when each window comes, crosses a face and is trimmed, to teach and to draw it.
+         *
+         *     The first steps are one operation each: a vertex leaves the queue, or the windows of one edge cross a face.
+         */
+        post: operations["followSweep"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/meshes/{mesh_id}/paths": {
         parameters: {
             query?: never;
@@ -3297,6 +3319,157 @@ export interface components {
             closed?: boolean;
         };
         /**
+         * SweepAnswer
+         * @description What an exact sweep does, step by step. Step 0 is the start; columns have a row for each.
+         */
+        SweepAnswer: {
+            /**
+             * Kind
+             * @constant
+             */
+            kind: "sweep";
+            /** Mesh Id */
+            mesh_id: string;
+            /** Sources */
+            sources: components["schemas"]["ResolvedPoint"][];
+            /**
+             * Fronts
+             * @description Distance of the farthest vertex that has left the queue, in mesh units
+             */
+            fronts: number[];
+            /**
+             * Created
+             * @description Windows created so far
+             */
+            created: number[];
+            /**
+             * Crossed
+             * @description Windows that have crossed a face so far
+             */
+            crossed: number[];
+            /**
+             * Waiting
+             * @description Windows that wait in the queue
+             */
+            waiting: number[];
+            /**
+             * Trimmed
+             * @description Windows trimmed away so far
+             */
+            trimmed: number[];
+            /**
+             * Distances
+             * @description Of each vertex, `null` where unreachable
+             */
+            distances: (number | null)[];
+            /**
+             * Settled
+             * @description The step in which each vertex left the queue
+             */
+            settled: (number | null)[];
+            windows: components["schemas"]["SweepWindows"];
+            /** Warnings */
+            warnings: string[];
+        };
+        /**
+         * SweepRequest
+         * @description The exact sweep from ``sources``, step by step, on a mesh of at most 5000 faces.
+         * @example {
+         *       "sources": [
+         *         {
+         *           "vertex": 0
+         *         }
+         *       ],
+         *       "steps": 20
+         *     }
+         */
+        SweepRequest: {
+            /**
+             * Barriers
+             * @description Indices of blocked faces. They act as holes, and paths may bend at their corners. Default: `[]`
+             * @example [
+             *       7,
+             *       8
+             *     ]
+             */
+            barriers?: number[];
+            /** Sources */
+            sources: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[];
+            /**
+             * Steps
+             * @description At most this many, of even pace but for the first. Default: `200`
+             */
+            steps?: number;
+        };
+        /**
+         * SweepWindows
+         * @description Windows as columns: stretches of edges to which one pseudosource sends straight rays.
+         *
+         *     A window that trimming makes shorter ends, and what is left begins as another one.
+         */
+        SweepWindows: {
+            /**
+             * Tails
+             * @description The vertex from where `b0` and `b1` are measured
+             */
+            tails: number[];
+            /**
+             * Heads
+             * @description The vertex at the other end of the edge
+             */
+            heads: number[];
+            /**
+             * Faces
+             * @description The face that the window is about to cross, or has crossed; its rays come from the other side of the edge
+             */
+            faces: number[];
+            /**
+             * B0
+             * @description Where it begins on the edge, in mesh units
+             */
+            b0: number[];
+            /**
+             * B1
+             * @description Where it ends
+             */
+            b1: number[];
+            /**
+             * D0
+             * @description Distance of `b0` from the pseudosource
+             */
+            d0: number[];
+            /**
+             * D1
+             * @description Distance of `b1`
+             */
+            d1: number[];
+            /**
+             * Sigma
+             * @description Distance of the pseudosource from the source
+             */
+            sigma: number[];
+            /**
+             * Pseudosources
+             * @description The vertex that the rays come from; `null` for a source that is no vertex
+             */
+            pseudosources: (number | null)[];
+            /**
+             * First
+             * @description The step after which the window is there
+             */
+            first: number[];
+            /**
+             * Crossed
+             * @description The step in which it crosses its face, having waited in the queue
+             */
+            crossed: (number | null)[];
+            /**
+             * Last
+             * @description The step in which trimming takes it away, or makes it shorter
+             */
+            last: (number | null)[];
+        };
+        /**
          * TraceAnswer
          * @description Straightest lines, in the order of the request.
          */
@@ -3919,6 +4092,115 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["StepsAnswer"];
+                };
+            };
+            /** @description With `Prefer: respond-async`: the job */
+            202: {
+                headers: {
+                    Location: components["headers"]["Location"];
+                    "Preference-Applied": components["headers"]["Preference-Applied"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobDocument"];
+                };
+            };
+            /** @description The requested range */
+            206: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Content-Range": components["headers"]["Content-Range"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": string;
+                };
+            };
+            /** @description malformed_body, idempotency_key_unused, malformed_request */
+            400: components["responses"]["Problem"];
+            /** @description unauthorized */
+            401: components["responses"]["Unauthorized"];
+            /** @description origin_not_allowed */
+            403: components["responses"]["Problem"];
+            /** @description mesh_not_found */
+            404: components["responses"]["Problem"];
+            /** @description not_acceptable */
+            406: components["responses"]["Problem"];
+            /** @description upload_too_large, result_too_large */
+            413: components["responses"]["Problem"];
+            /** @description unsupported_media_type */
+            415: components["responses"]["Problem"];
+            /** @description range_not_satisfiable */
+            416: components["responses"]["Problem"];
+            /** @description host_not_allowed */
+            421: components["responses"]["Problem"];
+            /** @description invalid_point, not_embedded, invalid_request, limit_exceeded, memory_limit */
+            422: components["responses"]["Problem"];
+            /** @description quota_exceeded, rate_limited */
+            429: components["responses"]["ProblemForNow"];
+            /** @description header_too_large */
+            431: components["responses"]["Problem"];
+            /** @description worker_died, mesh_damaged, internal_error */
+            500: components["responses"]["Problem"];
+            /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
+            503: components["responses"]["ProblemForNow"];
+            /** @description deadline_exceeded */
+            504: components["responses"]["Problem"];
+            /** @description storage_full, quota_exceeded */
+            507: components["responses"]["Problem"];
+        };
+    };
+    followSweep: {
+        parameters: {
+            query?: {
+                /** @description Overrides `Accept` */
+                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv";
+                /** @description Type of the numbers in `npy`, `npz` and `octets` */
+                dtype?: "float64" | "float32";
+            };
+            header?: {
+                /** @description The longest time that the client waits, in milliseconds; it bounds no job */
+                "x-timeout-ms"?: number;
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
+                prefer?: string;
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job. With `Prefer: respond-async` only */
+                "idempotency-key"?: string;
+                /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
+                Range?: string;
+            };
+            path: {
+                mesh_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SweepRequest"];
+            };
+        };
+        responses: {
+            /** @description The windows, the front, and the counts of each step */
+            200: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SweepAnswer"];
                 };
             };
             /** @description With `Prefer: respond-async`: the job */

@@ -66,6 +66,7 @@ def sweep_nodes(
     bounds: Bounds,
     control: Control,
     share_done: Callable[[Wavefront], float],
+    engine: Engine | None = None,
 ) -> Wavefront:
     """Start a sweep at the sources of ``nodes``, run it to its end, and reach its targets.
 
@@ -92,7 +93,7 @@ def sweep_nodes(
         )
         if nodes.has_site_targets:
             site_targets.watch_sites(wave.sites.ints, wave.pool.lists, nodes.first_target)
-        wave, outcome = run_sweep(mesh, wave, bounds, control, share)
+        wave, outcome = run_sweep(mesh, wave, bounds, control, share, engine)
         if nodes.has_site_targets and outcome == Outcome.FINISHED:
             continuous_dijkstra.reach_sites_inside(topology, wave, bounds, nodes.first_target)
         return wave, outcome
@@ -178,7 +179,7 @@ def run_sweep(
             continue
         if outcome == Outcome.RUNNING:
             faster = min(max(SLICE_SECONDS / took, 0.5), 2.0)
-            budget = max(int(budget * faster), _SMALLEST_BUDGET)
+            budget = min(max(int(budget * faster), _SMALLEST_BUDGET), NEVER)
         left = budget
     return wave, Outcome(outcome)
 

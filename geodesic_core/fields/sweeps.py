@@ -16,6 +16,7 @@ from geodesic_core.fields.path import EXACT, ErrorBound
 from geodesic_core.fields.question import Question
 from geodesic_core.fields.sweep import (
     NEVER,
+    Engine,
     RowMethod,
     share_of_vertices,
     sweep_nodes,
@@ -115,9 +116,16 @@ class WholeSweep(ABC):
         return self.run_for(control, paths=retain != "distances", windows=windows)
 
     def run_for(
-        self, control: Control, *, paths: bool = False, windows: Flags | None = None
+        self,
+        control: Control,
+        *,
+        paths: bool = False,
+        windows: Flags | None = None,
+        engine: Engine | None = None,
     ) -> Wavefront:
         """Return the state after the sweep, with the data of paths and the windows of some faces.
+
+        The ``engine`` is as in `run_sweep`.
 
         Raises
         ------
@@ -130,7 +138,7 @@ class WholeSweep(ABC):
         control.check_memory(state.bytes_of(wave))
         share = share_of_vertices(question.reachable, limit)
         starts = question.start_distances
-        wave = sweep_nodes(mesh, wave, nodes, starts, bounds, control, share)
+        wave = sweep_nodes(mesh, wave, nodes, starts, bounds, control, share, engine)
         control.check_memory(peak_bytes(wave))
         wave.vertices.distance[wave.vertices.distance > limit] = math.inf
         control.finish()

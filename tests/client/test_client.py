@@ -242,6 +242,17 @@ def test_log_maps_and_lines_are_the_library_s(
             assert line.end_direction == own.end_direction
 
 
+def test_the_steps_of_a_sweep_are_the_library_s(
+    service: Client, mesh: Mesh, same: gc.TriangleMesh
+) -> None:
+    found = service.sweep_steps(mesh, [3, 9], 50, barriers=[5])
+    own = gc.sweep_steps(same, [3, 9], 50, barriers=[5])
+    for name in ("fronts", "created", "crossed", "waiting", "trimmed", "distances", "settled"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(own, name))
+    for name, column in found.windows.items():
+        np.testing.assert_array_equal(column, getattr(own.windows, name))
+
+
 def test_samples_cells_and_means_are_the_library_s(
     service: Client, mesh: Mesh, same: gc.TriangleMesh
 ) -> None:

@@ -72,6 +72,8 @@ RECORDS |= {
     "gc.Polar",
     "gc.Profile",
     "gc.StraightLine",
+    "gc.SweepSteps",
+    "gc.SweepWindows",
     "gc.TangentFrames",
     "gc.terrain.Terrain",
 }

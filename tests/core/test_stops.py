@@ -132,6 +132,7 @@ CALLS["certify"] = Call(FIELDS["exact"], lambda field, **watch: field.certify(**
 CALLS["cells"] = Call(FIELDS["two"], lambda field, **watch: field.cells(**watch).cell_of)
 CALLS["loop"] = Call(knot, lambda m, **watch: gc.shortest_loop(m, 7, **watch))
 CALLS["handles"] = Call(knot, gc.handle_loops)
+CALLS["sweep steps"] = Call(knot, lambda m, **watch: gc.sweep_steps(m, 7, **watch).windows.d0)
 CALLS["tight"] = Call(bent, gc.straighten)
 READY = {f"{f}: {m}": Call(FIELDS[f], METHODS[m]) for f, m in PAIRS if not computes(f, m)}
 TO_ONE = [name for name in CALLS if "_at" not in name and "path_to" not in name]

@@ -16,6 +16,7 @@ from tests.support.service import check_problem, upload_sample
 OFFERED = {
     "distances": "json npy octets csv ply",
     "path": "json npy octets obj csv",
+    "sweep": "json",
     "paths": "json obj csv",
     "isolines": "json obj csv",
     "borders": "json obj csv",
@@ -33,6 +34,7 @@ OFFERED = {
 BODIES: dict[str, dict[str, Any]] = {
     "distances": {"sources": [{"vertex": 0}, {"vertex": 7}]},
     "path": {"source": {"vertex": 0}, "target": {"vertex": 60}},
+    "sweep": {"sources": [{"vertex": 0}], "steps": 9},
     "paths": {"source": {"vertex": 0}, "targets": [{"vertex": 60}, {"vertex": 0}, {"vertex": 99}]},
     "isolines": {"sources": [{"vertex": 60}], "levels": [0.25, 0.5, 9.0]},
     "borders": {"sources": [{"vertex": 0}, {"vertex": 7}]},

@@ -45,6 +45,7 @@ MORE_SEEDS: Mapping[str, tuple[Any, ...]] = {
     "computeBoundaries": ({"barriers": [7], "include": ["locations"]},),
     "computePath": ({"source": {"vertex": 0}, "target": {"vertex": 9}, "max_distance": 9},),
     "computePathSteps": ({"source": 0, "target": 9, "waypoints": [7], "barriers": [5]},),
+    "followSweep": ({"sources": [0, {"edge": [0, 1], "t": 0.5}], "steps": 9, "barriers": [5]},),
     "computePaths": (
         {"source": {"polyline": [{"vertex": 0}, {"vertex": 1}]}, "targets": [{"vertex": 9}]},
     ),

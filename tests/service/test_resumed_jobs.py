@@ -35,6 +35,7 @@ QUERIES: dict[str, dict[str, Any]] = {
     "trace": {"starts": [INSIDE], "directions": [[1, 0, 0]], "lengths": [0.3]},
     "locate": {"points": [[0.1, 0.2, 0.3]]},
     "steps": {"source": VERTEX, "target": INSIDE},
+    "sweep": {"sources": [INSIDE], "steps": 9},
 }
 """A query of each kind"""
 LINKS = {kind: kind for kind in QUERIES} | {"steps": "path/steps", "log_map": "log-map"}

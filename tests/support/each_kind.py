@@ -69,6 +69,7 @@ QUESTIONS: dict[str, Callable[[], object]] = {
     "barriers": lambda: gc.exact_distance(MESH, LAST, barriers=[0, 1]).path_to(LAST // 2),
     "certificate": lambda: gc.exact_distance(MESH, 0).certify(),
     "log map": lambda: gc.log_map(MESH, POINT),
+    "sweep steps": lambda: gc.sweep_steps(MESH, POINT, 9),
     "straight line": lambda: gc.trace(MESH, POINT, [0.5], [1.0]),
     "samples": lambda: gc.farthest_points(MESH, 4),
     "cells": lambda: gc.exact_distance(MESH, [0, LAST]).cells().areas,

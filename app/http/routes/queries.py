@@ -84,6 +84,17 @@ OPERATIONS = (
         "The steps, in order",
     ),
     Operation(
+        "/sweep",
+        queries.SweepQuery,
+        answers.SweepAnswer,
+        "followSweep",
+        "The windows of an exact sweep, step by step, on a mesh of at most 5000 faces",
+        "Return when each window comes, crosses a face and is trimmed, to teach and to draw it.\n\n"
+        "The first steps are one operation each: a vertex leaves the queue, or the windows of one "
+        "edge cross a face.",
+        "The windows, the front, and the counts of each step",
+    ),
+    Operation(
         "/paths",
         queries.PathsQuery,
         answers.PathsAnswer,

@@ -36,3 +36,12 @@ export function button(text: string, onClick: () => void): HTMLButtonElement {
   element.addEventListener("click", onClick);
   return element;
 }
+
+/** Hand a file to the user. */
+export function download(blob: Blob, name: string): void {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}

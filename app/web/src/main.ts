@@ -9,6 +9,7 @@ import { Rays } from "./ask/rays";
 import { Routes } from "./ask/routes";
 import { Walks } from "./ask/walks";
 import { byId } from "./dom";
+import { Player } from "./film/player";
 import {
   dismissHint,
   foldOnPhone,
@@ -47,6 +48,10 @@ const routes = new Routes(status, sceneView, notes);
 const meshes = new Meshes(store, status);
 const controls = new Controls(store, status, sceneView, notes);
 const exportPanel = new ExportPanel(store, status, stage);
+const player = new Player(store, status, sceneView, () => {
+  fields.paint(store.state);
+  void showWires(store.state);
+});
 const pointer = new Pointer(sceneView, store, () => controls.tool);
 pointer.onHover = (point) => fields.tell(point, store.state);
 listenToKeys(store, status, sceneView, pointer);
@@ -59,6 +64,7 @@ fields.onPaint = (state) => {
   isolines.follow(state);
   borders.follow(state);
   rays.follow(state);
+  player.redraw();
 };
 setUpAppearance(() => void showWires(store.state));
 
@@ -79,6 +85,7 @@ store.listen((state, before) => {
   fields.follow(state);
   routes.follow(state);
   walks.follow(state);
+  player.follow(state);
   if (state.unit !== before.unit) nameUnit(state);
   if (state.range !== before.range) fields.paint(state);
   if (state.palette !== before.palette) showPalette(state);

@@ -31,6 +31,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "distances": {"sources": SOURCES, "targets": POINTS, "effort": 2, **ACCURACY, **LIMITS},
     "path": {"source": 1, "target": 2, "waypoints": POINTS, "effort": 4, **ACCURACY, **LIMITS},
     "steps": {"source": 1, "target": 2, "waypoints": POINTS, **LIMITS},
+    "sweep": {"sources": POINTS, "steps": 20, "barriers": [5]},
     "paths": {"source": 1, "targets": POINTS, "effort": 8, **ACCURACY, **LIMITS},
     "isolines": {"values": [1, 1.5], "levels": [1, 1.5], "count": 3, **LINES, **ACCURACY},
     "borders": LINES,
@@ -85,7 +86,7 @@ def test_numbers_in_quotes_are_refused(kind: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "kind", sorted(KINDS.keys() - {"boundaries", "cut", "loop", "samples", "mean"})
+    "kind", sorted(KINDS.keys() - {"boundaries", "cut", "loop", "samples", "mean", "sweep"})
 )
 def test_integers_are_numbers_as_well(kind: str) -> None:
     body = read_body(kind, BODIES[kind])

@@ -34,6 +34,7 @@ QUESTIONS: list[tuple[str, dict[str, Any], list[str]]] = [
     ("loop", {"curves": [{"polyline": [NEAR]}, {"polyline": [24, FAR]}]}, ["Point 1 of curve 1"]),
     ("nearest", {"source": 0, "candidates": [NEAR, FAR]}, ["Candidate 1"]),
     ("log_map", {"source": FAR, "x_axis": 3}, ["The source"]),
+    ("sweep", {"sources": [NEAR, FAR]}, ["Source 1"]),
     ("trace", {"starts": [NEAR, FAR], "directions": [0.1], "lengths": [0.1]}, ["Start 1"]),
     ("matrix", {"sources": "all", "targets": [NEAR, FAR]}, ["Target 1"]),
     ("matrix", {"sources": [NEAR, FAR], "targets": "all"}, ["Source 1"]),

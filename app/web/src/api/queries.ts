@@ -17,6 +17,7 @@ import type {
   Step,
   StepsAnswer,
   StraightLine,
+  SweepAnswer,
   TraceAnswer,
   TraceRequest,
   Unreachable,
@@ -193,6 +194,24 @@ export async function askSteps(
   const source = sources[await nearestSource(mesh, question, signal)];
   const response = await post(`v1/meshes/${mesh}/path/steps`, { source, ...rest }, {}, signal);
   return ((await response.json()) as StepsAnswer).steps;
+}
+
+export interface SweepQuestion {
+  sources: Point[];
+  barriers: number[];
+  steps: number;
+}
+
+/** Return the steps of an exact sweep. */
+export async function askSweep(
+  mesh: string,
+  question: SweepQuestion,
+  onProgress: (share: number) => void,
+  signal: AbortSignal,
+): Promise<SweepAnswer> {
+  const path = `v1/meshes/${mesh}/sweep`;
+  const response = await answerOf(path, question, JSON_TYPE, onProgress, signal);
+  return response.json() as Promise<SweepAnswer>;
 }
 
 async function nearestSource(

@@ -23,6 +23,7 @@ export type ResolvedPoint = Schemas["ResolvedPoint"];
 export type Step = Schemas["SearchStep"];
 export type StraightLine = Schemas["StraightLine"];
 export type StepsAnswer = Schemas["StepsAnswer"];
+export type SweepAnswer = Schemas["SweepAnswer"];
 export type TraceAnswer = Schemas["TraceAnswer"];
 export type TraceRequest = Schemas["TraceRequest"];
 export type Unreachable = Schemas["Unreachable"];

@@ -4,7 +4,7 @@ import type { About, Point } from "../api/types";
 import { bordersOf } from "../ask/borders";
 import { questionOf } from "../ask/fields";
 import { isolinesOf } from "../ask/isolines";
-import { button, byId } from "../dom";
+import { button, byId, download } from "../dom";
 import { writeState } from "../state/permalink";
 import type { State, Store } from "../state/state";
 import type { Status } from "../status";
@@ -140,12 +140,4 @@ function onCopy(id: string, what: string, text: () => string): void {
 
 function note(words: string): void {
   byId("export-note").textContent = words;
-}
-
-function download(blob: Blob, name: string): void {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(blob);
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }

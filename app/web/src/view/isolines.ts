@@ -3,7 +3,7 @@ import { BufferGeometry } from "three";
 import type { Line } from "../api/types";
 import type { LoadedMesh } from "../mesh/loader";
 import { ribbonMesh, ribbons } from "./ribbon";
-import type { Stage } from "./scene";
+import { LINES, type Stage } from "./scene";
 
 export class IsolineLayer {
   private readonly object = ribbonMesh({
@@ -18,6 +18,7 @@ export class IsolineLayer {
 
   constructor(private readonly stage: Stage) {
     this.object.visible = false;
+    this.object.layers.set(LINES);
     stage.add(this.object);
   }
 

@@ -24,6 +24,9 @@ const ABOVE = new Vector3(0.4, 0.9, 0.8);
 /** Below this half height, in radii of the unit ball, a mesh is flat. */
 const FLAT = 0.3;
 
+/** The layer of lines on the surface, which may be hidden all at once. */
+export const LINES = 1;
+
 export class Stage {
   private readonly scene = new Scene();
   /** Objects that move while the mesh stands still; drawn over it. */
@@ -58,6 +61,7 @@ export class Stage {
         this.onMove(this.view);
       before = null;
     });
+    this.camera.layers.enable(LINES);
     this.look(null);
     new ResizeObserver(() => this.resize()).observe(canvas);
     this.resize();
@@ -67,6 +71,13 @@ export class Stage {
   set turnsByDrag(turns: boolean) {
     this.controls.mouseButtons.LEFT = turns ? MOUSE.ROTATE : null;
     this.controls.touches.ONE = turns ? TOUCH.ROTATE : null;
+  }
+
+  /** Set whether isolines, borders and rays are drawn. */
+  set showsLines(shows: boolean) {
+    if (shows) this.camera.layers.enable(LINES);
+    else this.camera.layers.disable(LINES);
+    this.invalidate();
   }
 
   /** Draw a frame soon. */

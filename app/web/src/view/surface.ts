@@ -61,6 +61,11 @@ const FRAGMENT = /* glsl */ `
     gl_FragColor = vec4(colour, 1.0);
   }`;
 
+const CLAY = new Color().setRGB(0.72, 0.74, 0.78);
+/** Of a film: what is reached, and what is not. */
+const REACHED = 0.96;
+const UNREACHED = new Color().setRGB(0.4, 0.42, 0.47);
+
 /** Return the material of all surfaces, made once because its shader takes long to compile. */
 export function surfacePaint(): ShaderMaterial {
   return new ShaderMaterial({
@@ -68,7 +73,7 @@ export function surfacePaint(): ShaderMaterial {
       ramp: { value: rampTexture(INITIAL.palette) },
       largest: { value: 1 },
       tinted: { value: 0 },
-      clay: { value: new Color().setRGB(0.72, 0.74, 0.78) },
+      clay: { value: CLAY },
     },
     vertexShader: VERTEX,
     fragmentShader: FRAGMENT,
@@ -123,9 +128,19 @@ export class Surface {
     this.uniform("largest").value = largest || 1;
   }
 
+  /** Light the vertices that have a finite value, and dim all others, until territories are set. */
+  setReached(values: ArrayLike<number>, largest: number): void {
+    this.setValues(values, largest);
+    this.tints.array.fill(REACHED);
+    this.tints.needsUpdate = true;
+    this.uniform("tinted").value = 1;
+    this.uniform("clay").value = UNREACHED;
+  }
+
   /** Tint by the nearest source of each vertex; null: colour by value alone. */
   setTerritories(nearest: Int32Array | null): void {
     this.uniform("tinted").value = nearest ? 1 : 0;
+    this.uniform("clay").value = CLAY;
     if (!nearest) return;
     const array = this.tints.array;
     for (let i = 0; i < nearest.length; i++) {

@@ -5,7 +5,7 @@ import { divide, type Piece } from "../mesh/division";
 import type { LoadedMesh } from "../mesh/loader";
 import { territory } from "./colours";
 import { IsolineLayer } from "./isolines";
-import type { Stage } from "./scene";
+import { LINES, type Stage } from "./scene";
 import { inFront } from "./surface";
 
 export class Territories {
@@ -19,6 +19,7 @@ export class Territories {
     this.lines = new IsolineLayer(stage);
     this.object = new Mesh(new BufferGeometry(), inFront(paint));
     this.object.visible = false;
+    this.object.layers.set(LINES);
     stage.add(this.object);
   }
 
