@@ -171,8 +171,6 @@ class DistancesQuery(FromSources[DistancesRequest]):
 
 def _check_certifiable(request: DistancesRequest) -> None:
     """Refuse to prove what has no certificate."""
-    if request.method == "fast":
-        raise invalid_fields(["/certify"], "a fast answer has no certificate: ask for another one")
     if any(isinstance(source, CurveSource) for source in request.sources):
         message = "distances from curves have no certificate yet: give points as sources"
         raise invalid_fields(["/certify"], message)

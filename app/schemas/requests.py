@@ -195,9 +195,9 @@ class DistancesRequest(AccuracyOrEffort, AmongBarriers):
     )
     certify: StrictBool = Field(
         default=False,
-        description="Also prove the distances of vertices, for `exact` and `approximate`, from "
-        "sources that are points. It takes about fifteen times as long. The answer has a "
-        "`certificate`, and as `npz` it is the file that `geodesic-verify` checks",
+        description="Also prove the distances of vertices, from sources that are points. It takes "
+        "about fifteen times as long as exact distances. The answer has a `certificate`, and as "
+        "`npz` it is the file that `geodesic-verify` checks",
     )
     cost: SurfaceCost | None = Field(
         default=None,

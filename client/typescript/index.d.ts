@@ -1306,7 +1306,7 @@ export interface components {
             include?: ("nearest_source" | "gradient" | "lower" | "upper" | "violations")[];
             /**
              * Certify
-             * @description Also prove the distances of vertices, for `exact` and `approximate`, from sources that are points. It takes about fifteen times as long. The answer has a `certificate`, and as `npz` it is the file that `geodesic-verify` checks. Default: `false`
+             * @description Also prove the distances of vertices, from sources that are points. It takes about fifteen times as long as exact distances. The answer has a `certificate`, and as `npz` it is the file that `geodesic-verify` checks. Default: `false`
              */
             certify?: boolean;
             /** @description Find what the cheapest ways cost instead of how long the shortest are. `distances` are costs then; what is about distances does not go with it */

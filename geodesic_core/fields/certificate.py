@@ -142,19 +142,18 @@ def certified(sweep: Sweep, result: SweepResult, control: Control) -> Certificat
     Raises
     ------
     InvalidArgument
-        The sweep is a fast one, or has curves as sources.
+        The sweep has curves as sources.
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As the control says.
     """
-    if not isinstance(sweep, WholeSweep):
-        raise InvalidArgument(
-            "a fast field has no certificate, as its windows do not cover the edges: certify an "
-            "exact or an approximate one"
-        )
-    whole, question = sweep, sweep.question
+    # Windows of a fast sweep do not cover the edges: what an exact one finds proves it as well.
+    whole = sweep if isinstance(sweep, WholeSweep) else sweep.exact
+    question = sweep.question
     if question.has_curves:
         raise InvalidArgument("a field with curves as sources has no certificate yet: give points")
     winners, windows = result.winners, result.windows
+    if whole is not sweep:
+        windows = None
     mesh, limit = question.mesh, question.max_distance
     if winners is None or windows is None or math.isfinite(limit):
         # Faces at the limit must have all windows.

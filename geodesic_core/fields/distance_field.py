@@ -897,7 +897,8 @@ class DistanceField:
         """Prove the distances: return lower and upper bounds, with what proves them.
 
         After that `error_bound` is certified: the largest difference between a distance and its
-        bounds, mesh units.
+        bounds, mesh units. A fast field is proved by an exact sweep: its distances are the lengths
+        of paths, and no less than ``lower``.
 
         Parameters
         ----------
@@ -912,13 +913,13 @@ class DistanceField:
         Raises
         ------
         InvalidArgument
-            The field is a fast one, or a source is a curve.
+            A source is a curve.
         Cancelled, DeadlineExceeded, MemoryLimitExceeded
             As in `Control`; the field can still be used.
 
         Notes
         -----
-        A field that does not retain its windows, or has a limit, sweeps again. O(F + windows), and
+        A field that is fast, does not retain its windows, or has a limit, sweeps again. O(F + windows), and
         O(length of all paths): ten to eighteen times as long as a sweep without a limit.
 
         Examples

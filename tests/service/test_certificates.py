@@ -27,6 +27,7 @@ from tests.support.service import (
 
 EXACT: dict = {}
 APPROXIMATE = {"method": "approximate", "relative_error": 0.05}
+FAST = {"method": "fast", "effort": 1}
 CHECKER = Path(verify.__file__)
 CURVE = {"polyline": [{"vertex": 0}, {"vertex": 1}]}
 
@@ -46,13 +47,15 @@ def numbers(values: list) -> np.ndarray:
 
 
 def solved(mesh: gc.TriangleMesh, method: dict, limit: float | None = None) -> gc.DistanceField:
+    if method == FAST:
+        return gc.fast_distance(mesh, [3, 9], 1, max_distance=limit)
     if method:
         return gc.approximate_distance(mesh, [3, 9], 0.05, max_distance=limit)
     return gc.exact_distance(mesh, [3, 9], max_distance=limit)
 
 
 @pytest.mark.parametrize("limit", [None, 0.5])
-@pytest.mark.parametrize("method", [EXACT, APPROXIMATE])
+@pytest.mark.parametrize("method", [EXACT, APPROXIMATE, FAST])
 def test_it_is_the_library_s(
     client: TestClient, knot: str, method: dict, limit: float | None
 ) -> None:
@@ -119,7 +122,6 @@ def test_bounds_are_columns_of_tables(client: TestClient, knot: str) -> None:
 @pytest.mark.parametrize(
     ("body", "place"),
     [
-        ({"method": "fast"}, "/certify"),
         ({"sources": [{"vertex": 3}, CURVE]}, "/certify"),
         ({"certify": "yes"}, "/certify"),
         ({"certify": False, "include": ["lower"]}, "/include"),
