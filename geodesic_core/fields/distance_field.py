@@ -919,8 +919,9 @@ class DistanceField:
 
         Notes
         -----
-        A field that is fast, does not retain its windows, or has a limit, sweeps again. O(F + windows), and
-        O(length of all paths): ten to eighteen times as long as a sweep without a limit.
+        A field that is fast, does not retain its windows, or has a limit, sweeps again.
+        O(F + windows), and O(length of all paths): ten to eighteen times as long as a sweep without
+        a limit.
 
         Examples
         --------

@@ -6,19 +6,29 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from geodesic_core.arrays import Floats
+from geodesic_core.arrays import Floats, Longs
 from geodesic_core.errors import InvalidArgument
 from geodesic_core.extras import extra
 from geodesic_core.io.grid import grid_faces
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.terrain.crs import as_map_crs
 from geodesic_core.terrain.ground import Terrain
+from geodesic_core.validation import is_number
 
 Transform = Sequence[float]
 """Six numbers a, b, c, d, e, f: x = a · column + b · row + c, y = d · column + e · row + f. As
 rasterio has them, whose nine are taken too."""
+
+
+class _Grid(NamedTuple):
+    rows: Longs
+    """(V,): of each vertex"""
+    columns: Longs
+    """(V,)"""
+    faces: Longs
+    """(F, 3): counter-clockwise seen from above, where rows go south"""
 
 
 class _Raster(NamedTuple):
@@ -36,6 +46,7 @@ def from_dem(
     *,
     nodata: float | None = None,
     crs: Any = None,
+    max_error: float | None = None,
 ) -> Terrain:
     r"""Return an elevation model as a surface: a vertex for each height that was measured.
 
@@ -59,25 +70,30 @@ def from_dem(
     crs
         The CRS of x and y, as ``"EPSG:32632"``, or anything else that pyproj takes; by default the
         file's own, if it has one.
+    max_error
+        How far a measured height may lie above or below the surface, in the unit of heights. Then
+        only as many vertices are taken as that needs, by greedy insertion (Delatin); None takes
+        all. `Terrain.notes` tells the largest error that is left.
 
     Returns
     -------
     Terrain
-        With vertices in the order of rows, and costs of 1.
+        With costs of 1; without ``max_error`` its vertices are in the order of rows.
 
     Raises
     ------
     InvalidArgument
         The file cannot be read, or is no raster of one band; the heights are no numbers, or fewer
-        than two rows or columns; or there is no transform, or it has no area.
+        than two rows or columns; there is no transform, or it has no area; or ``max_error`` is not
+        above 0.
     UnsuitableCrs
         The CRS is not known, or its coordinates are degrees.
     MissingExtra
-        rasterio or pyproj is not installed; the extra ``terrain`` brings them.
+        rasterio, pyproj or pydelatin is not installed; the extra ``terrain`` brings them.
 
     Notes
     -----
-    O(pixels). Heights are those of the raster: no vertex is left out, so no error is added.
+    O(pixels); with ``max_error`` O(pixels · log(vertices)) in practice.
 
     Examples
     --------
@@ -102,16 +118,55 @@ def from_dem(
     measured = np.isfinite(raster.heights)
     if nodata is not None:
         measured &= raster.heights != nodata
-    faces = grid_faces(measured)
+    grid, notes = _regular(measured), _notes(int((~measured).sum()), known)
+    if max_error is not None:
+        grid, left = _decimated(raster.heights, measured, max_error)
+        what = f"{len(grid.rows):,} vertices for {measured.sum():,} measured heights"
+        notes += (f"It has {what}, none of which lies more than {left:.3g} above or below it.",)
+    row, column, faces = grid
     if not len(faces):
         raise InvalidArgument("no four neighbours of the raster are all measured: it has no faces")
-    row, column = np.nonzero(measured)
     places = np.stack([column + 0.5, row + 0.5, np.ones(len(row))], axis=1) @ affine.T
     if np.linalg.det(affine[:, :2]) > 0.0:  # rows go north: seen from above, faces turn round
         faces = faces[:, [0, 2, 1]]
-    mesh = TriangleMesh(np.column_stack([places, raster.heights[measured]]), faces)
-    notes = _notes(int((~measured).sum()), known)
+    mesh = TriangleMesh(np.column_stack([places, raster.heights[row, column]]), faces)
     return Terrain(mesh, np.ones(len(faces)), None if known is None else known.to_wkt(), notes)
+
+
+def _regular(measured: NDArray[np.bool_]) -> _Grid:
+    """Return two faces for each four neighbours that are all measured."""
+    row, column = np.nonzero(measured)
+    return _Grid(row, column, grid_faces(measured))
+
+
+def _decimated(
+    heights: Floats, measured: NDArray[np.bool_], max_error: float
+) -> tuple[_Grid, float]:
+    """Return few faces that are near all measured heights, and how near.
+
+    Gaps count as far below: so their rims become vertices, and the faces inside are left out.
+    """
+    if not is_number(max_error) or not 0.0 < max_error < np.inf:
+        raise InvalidArgument(f"max_error is {max_error!r}; it must be a finite number above 0")
+    with extra("terrain", "pydelatin", "max_error"):
+        from pydelatin import Delatin
+    rows, columns = heights.shape
+    known = heights[measured]
+    low, high = (known.min(), known.max()) if len(known) else (0.0, 0.0)
+    far = 1e3 * (high - low + max_error)
+    level = np.where(measured, heights - low, -far).astype(np.float32)
+    found = Delatin(level, width=columns, height=rows, max_error=max_error)
+    column, row = found.vertices[:, 0].astype(np.int64), found.vertices[:, 1].astype(np.int64)
+    row = rows - 1 - row  # there the last row is at 0
+    faces = found.triangles.astype(np.int64)
+    faces = faces[measured[row, column][faces].all(axis=1)]
+    (ax, bx, cx), (ay, by, cy) = column[faces].T, row[faces].T
+    turned = (bx - ax) * (cy - ay) > (cx - ax) * (by - ay)  # seen from above, rows go down
+    faces[turned] = faces[turned][:, [0, 2, 1]]
+    used, faces = np.unique(faces, return_inverse=True)
+    rounded = float(np.finfo(np.float32).eps) * float(high - low)
+    grid = _Grid(row[used], column[used], faces.reshape(-1, 3))
+    return grid, float(found.error) + rounded
 
 
 def _notes(gaps: int, crs: Any) -> tuple[str, ...]:

@@ -1,5 +1,6 @@
 """Elevation models: vertices are where pixels are, gaps are holes, and the rest is refused."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -140,3 +141,56 @@ def test_costs_are_one_for_each_face() -> None:
     with pytest.raises(gc.errors.InvalidArgument, match="other costs than 1 and infinity"):
         land.with_costs([2] * 8).open_mesh()
     assert land.open_mesh() is land.mesh
+
+
+# Few triangles
+
+
+def heights_on(land: gc.terrain.Terrain, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+    """Return how high each face is at the centre of a pixel; NaN beside it."""
+    a, b, c = np.moveaxis(land.mesh.vertices[land.mesh.faces], 1, 0)
+    place = np.array(TRANSFORM).reshape(2, 3) @ [column + 0.5, row + 0.5, 1.0]
+    u, v, w = b - a, c - a, place - a[:, :2]
+    area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    s = (w[:, 0] * v[:, 1] - w[:, 1] * v[:, 0]) / area
+    t = (u[:, 0] * w[:, 1] - u[:, 1] * w[:, 0]) / area
+    inside = np.minimum(np.minimum(s, t), 1.0 - s - t) >= -1e-9
+    return np.where(inside, a[:, 2] + s * u[:, 2] + t * v[:, 2], np.nan)
+
+
+@pytest.mark.parametrize("max_error", [0.05, 1.0, 10.0])
+@pytest.mark.parametrize("gaps", [False, True])
+def test_no_height_is_farther_than_the_error_from_few_triangles(
+    max_error: float, gaps: bool
+) -> None:
+    heights = rough() + 3000.0
+    if gaps:
+        heights[4:9, 12:20] = np.nan
+        heights[20, 5] = np.nan
+    whole = gc.terrain.from_dem(heights, TRANSFORM)
+    land = gc.terrain.from_dem(heights, TRANSFORM, max_error=max_error)
+    (told,) = re.findall(r"more than (\S+) above or below", land.notes[-1])
+    assert float(told) <= max_error * 1.001 + 1e-4
+    assert len(land.mesh.vertices) < len(whole.mesh.vertices)
+    assert (map_areas(land.mesh) > 0.0).all()
+    assert set(map(tuple, land.mesh.vertices)) <= set(map(tuple, whole.mesh.vertices))
+    covered = 0
+    for row, column in np.ndindex(heights.shape):
+        found = heights_on(land, row, column)
+        found = found[np.isfinite(found)]
+        if np.isnan(heights[row, column]):
+            assert not len(found)
+        elif len(found):
+            covered += 1
+            assert np.abs(found - heights[row, column]).max() <= float(told) * 1.001 + 1e-9
+    assert covered >= len(whole.mesh.vertices)
+    area, of_whole = map_areas(land.mesh).sum(), map_areas(whole.mesh).sum()
+    assert area >= of_whole * (1.0 - 1e-9)
+    if not gaps:
+        assert_allclose(area, of_whole, rtol=1e-9)
+
+
+@pytest.mark.parametrize("max_error", [0.0, -1.0, np.inf, np.nan, "1", True])
+def test_errors_that_are_none(max_error: object) -> None:
+    with pytest.raises(gc.errors.InvalidArgument, match="max_error is"):
+        gc.terrain.from_dem(rough(), TRANSFORM, max_error=max_error)  # type: ignore[arg-type]
