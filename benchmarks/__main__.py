@@ -9,6 +9,7 @@ from pathlib import Path
 from benchmarks import (
     approximate,
     attacks,
+    certificates,
     cluster,
     cortex,
     costs,
@@ -49,6 +50,7 @@ BENCHMARKS: dict[str, Callable[[Inputs, int], Section | Iterable[Section]]] = {
     "maps": maps.run,
     "samples": sampling.run,
     "cuts": cuts.run,
+    "certificates": certificates.run,
     "costs": costs.run,
     "matrix": matrix.run,
     "cortex": cortex.run,
