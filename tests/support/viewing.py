@@ -43,6 +43,23 @@ class View:
             if there.count():
                 return
 
+    def unfold(self, name: str) -> None:
+        """Open a folded part of the panel."""
+        self.page.click(f"#{name} > summary")
+
+    def ask(self, text: str, field: str = "#points") -> None:
+        """Write something into a field of the question."""
+        if not self.page.is_visible(field):
+            self.unfold("more-points")
+        self.page.fill(field, text)
+        self.page.press(field, "Enter")
+
+    def hover(self, x: float, y: float) -> str:
+        """Move the mouse beside the middle of the mesh; return what is said there."""
+        centre = self.centre
+        self.page.mouse.move(centre[0] + x, centre[1] + y)
+        return self.text("#cue")
+
     def upload(self, name: str, text: str) -> None:
         """Choose a file, and wait until its mesh is shown."""
         file = FilePayload(name=name, mimeType="", buffer=text.encode())
@@ -96,8 +113,11 @@ class View:
         )
 
     def pixels(self) -> NDArray[np.int64]:
-        """Return what is on the screen, (H, W, 3)."""
+        """Return what is on the screen but for the words that lie on the mesh, (H, W, 3)."""
+        words = "['cue', 'labels'].map(id => document.getElementById(id).style.visibility = '{}')"
+        self.page.evaluate(words.format("hidden"))
         image = Image.open(BytesIO(self.page.screenshot())).convert("RGB")
+        self.page.evaluate(words.format(""))
         return np.asarray(image, np.int64)
 
     def colour(
@@ -118,7 +138,7 @@ def query_of(view: View) -> dict[str, list[str]]:
     view.page.locator("html:not([data-address-due])").wait_for()
     search: dict[str, list[str]] = view.page.evaluate(
         "() => { const q = new URLSearchParams(location.search); const r = {};"
-        "for (const k of q.keys()) r[k] = q.getAll(k); return r; }"
+        "for (const k of q.keys()) r[k] = q.get(k).split(';'); return r; }"
     )
     return search
 
