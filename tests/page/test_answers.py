@@ -135,9 +135,9 @@ def test_a_position_far_from_the_surface_is_told(view: View, sphere: str) -> Non
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("v99999999", "Source: vertex 99999999 does not exist; the indices are 0 to 2561"),
-        ("e0-99999999:0.5", "Source: vertex 99999999 does not exist; the indices are 0 to 2561"),
-        ("f99999999:0.5,0.5,0", "Source: face 99999999 does not exist; the indices are 0 to 5119"),
+        ("v99999999", "vertex 99999999 does not exist; the indices are 0 to 2561"),
+        ("e0-99999999:0.5", "vertex 99999999 does not exist; the indices are 0 to 2561"),
+        ("f99999999:0.5,0.5,0", "face 99999999 does not exist; the indices are 0 to 5119"),
         ("v0 v99999999", "vertex 99999999 does not exist; the indices are 0 to 2561"),
         ("nose", "“nose” is not a point."),
         ("v0 v-1", "“v-1” is not a point."),
