@@ -320,6 +320,7 @@ def test_points_are_listed_in_words_and_edited_as_text(view: View, sphere: str) 
     view.page.focus("#max-distance")
     assert view.page.input_value("#points") == "v12 > no point", "what was typed is not lost"
     view.wait("error")
+    assert view.page.is_disabled("#undo"), "nothing has been done"
     view.ask("v12 > v3")
     view.wait()
     assert rows(view) == ["⠿ A Old mill ×", "⠿ B vertex 3 ×"], "names stay with their points"

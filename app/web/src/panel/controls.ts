@@ -146,7 +146,7 @@ export class Controls {
         this.store.update(change);
         this.notes.tell("points", notes);
       } catch (error) {
-        if (!reading.signal.aborted) this.store.update({ isReadable: false });
+        if (!reading.signal.aborted) this.store.replace({ isReadable: false });
         throw error;
       }
     });
