@@ -19,12 +19,11 @@ def test_a_tap(view: View, sphere: str) -> None:
     assert not view.page.is_visible("#folded")
 
 
-def tap(view: View, *places: tuple[float, float], seconds: float = 0.0) -> None:
+def tap(view: View, *places: tuple[float, float], seconds: float = 0.1) -> None:
     """Touch places, one after the other, for a while."""
     for place in places:
         view.touch(place)
-        view.page.wait_for_timeout(1000 * seconds)
-        view.touch()
+        view.touch(after=seconds)
         view.wait()
 
 

@@ -2,6 +2,7 @@
 
 import math
 from io import BytesIO
+from time import time
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ class View:
         self.errors: list[str] = []
         self._devtools = page.context.new_cdp_session(page)  # for what Playwright has no words
         self._fingers = 0
+        self._time = time()
         page.on("pageerror", lambda error: self.errors.append(str(error)))
         page.on("console", self._note)
 
@@ -94,14 +96,20 @@ class View:
         mouse.up()
         self.wait()
 
-    def touch(self, *places: Pixel) -> None:
-        """Have fingers at places beside the middle, and nowhere else; the first stays the first."""
+    def touch(self, *places: Pixel, after: float = 0.02) -> None:
+        """
+        Have fingers at places beside the middle, and nowhere else; the first stays the first.
+
+        By the browser's clock this is ``after`` so many seconds, however fast the machine is.
+        """
         x, y = self.centre
         points = [{"x": x + a, "y": y + b, "id": finger} for finger, (a, b) in enumerate(places)]
         kind = "touchEnd"
         if points:
             kind = "touchStart" if len(points) > self._fingers else "touchMove"
-        self._devtools.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+        self._time += after
+        event = {"type": kind, "touchPoints": points, "timestamp": self._time}
+        self._devtools.send("Input.dispatchTouchEvent", event)
         self._fingers = len(points)
 
     def throttle_uploads(self, rate: int) -> None:
