@@ -49,7 +49,7 @@ BoundedMethod = Literal["exact", "approximate"]
 """Methods of solving whose bound is guaranteed"""
 Layout = Literal["dense", "sparse", "pairs"]
 Number = Literal["float64", "float32"]
-SampleName = Literal["knot", "sphere", "terrain", "obstacles", "plane"]
+SampleName = Literal["knot", "sphere", "terrain", "cortex", "obstacles", "plane"]
 
 
 def effort(text: str) -> int:

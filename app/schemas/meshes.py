@@ -56,7 +56,7 @@ LONGEST_NAME = 255
 """Characters of the name of a mesh: as many as file systems allow for that of a file"""
 MeshName = Annotated[str, Field(max_length=LONGEST_NAME, pattern=r"^[^\x00-\x1f\x7f-\x9f]+$")]
 """Without control characters, which a terminal would obey"""
-SampleName = Literal["knot", "sphere", "terrain", "obstacles", "plane"]
+SampleName = Literal["knot", "sphere", "terrain", "cortex", "obstacles", "plane"]
 
 
 class UploadParameters(StrictModel):

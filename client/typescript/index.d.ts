@@ -5946,7 +5946,7 @@ export interface operations {
                 /** @description `exact` joins vertices at the same position; a distance in mesh units joins those no farther apart, and so all that steps of this length lead to, from vertex to vertex */
                 merge?: ("none" | "exact") | number;
                 /** @description The sample to make, instead of reading a mesh */
-                sample?: "knot" | "sphere" | "terrain" | "obstacles" | "plane";
+                sample?: "knot" | "sphere" | "terrain" | "cortex" | "obstacles" | "plane";
                 /** @description Approximate number of faces of the sample; 20000 if not given */
                 faces?: number;
             };

@@ -1,6 +1,7 @@
 """The samples: sizes, orientation, and that they are what they say."""
 
 from hashlib import blake2b
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -9,9 +10,9 @@ from geodesic_core import samples, shortest_path
 from geodesic_core.errors import InvalidArgument
 from tests.conftest import WITHOUT_JIT
 
-EULER = {"knot": 0, "sphere": 2, "terrain": 1, "obstacles": -15, "plane": 1}
-BOUNDARIES = {"knot": 0, "sphere": 0, "terrain": 1, "obstacles": 17, "plane": 1}
-FEWEST = {"knot": 500, "sphere": 20, "terrain": 200, "obstacles": 500, "plane": 2}
+EULER = {"knot": 0, "sphere": 2, "terrain": 1, "cortex": 2, "obstacles": -15, "plane": 1}
+BOUNDARIES = {"knot": 0, "sphere": 0, "terrain": 1, "cortex": 0, "obstacles": 17, "plane": 1}
+FEWEST = {"knot": 500, "sphere": 20, "terrain": 200, "cortex": 500, "obstacles": 500, "plane": 2}
 
 
 def test_the_registry_names_all_samples() -> None:
@@ -152,6 +153,20 @@ def test_the_terrain_s_faces_have_the_shorter_diagonals_of_their_cells() -> None
 
 
 @pytest.mark.jit
+def test_the_cortex_is_folded_and_flat_on_one_side_and_seen_from_outside() -> None:
+    sample = samples.cortex(20_000)
+    vertices, faces = sample.vertices, sample.faces
+    assert _volume(vertices, faces) > 0
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    assert -low[0] < 0.7 * high[0]
+    assert high[1] - low[1] == pytest.approx(2.5, abs=0.1)
+    edges = vertices[faces] - np.roll(vertices[faces], 1, axis=1)
+    area = float(np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1).sum() / 2.0)
+    half_axes = 0.5 * (high - low)
+    ellipsoid = 4 * np.pi * np.mean([a * b for a, b in combinations(half_axes, 2)])
+    assert area > 1.2 * ellipsoid, "a surface around the same room, without folds, has less"
+
+
 def test_the_obstacles_are_seen_from_above_and_have_holes_to_walk_around() -> None:
     sample = samples.obstacles(20_000)
     vertices, faces = sample.vertices, sample.faces

@@ -13,17 +13,12 @@ from scipy import ndimage
 
 from tests.page.conftest import sample
 from tests.page.test_page import PATH, seen
+from tests.support.paths import ROOT
 from tests.support.viewing import PLAIN, View, angle_at, length_of, query_of
 
 pytestmark = pytest.mark.file_slice(3)
 
 TWO_SHEETS = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 0 0\nv 6 0 0\nv 5 1 0\nf 1 2 3\nf 4 5 6\n"
-
-
-def ask(view: View, field: str, text: str) -> None:
-    """Write something into a field of the question."""
-    view.page.fill(field, text)
-    view.page.press(field, "Enter")
 
 
 def has_path(view: View) -> bool:
@@ -50,7 +45,8 @@ def test_a_closed_isoline_has_no_gap(view: View, sphere: str, level: float) -> N
     view.click(0, 0)
     without = view.pixels()
     view.page.select_option("#lines", "spacing")
-    ask(view, "#lines-value", str(level))
+    view.page.fill("#lines-value", str(level))
+    view.page.press("#lines-value", "Enter")
     view.wait()
 
     changed = np.abs(view.pixels() - without).max(axis=2) > 30
@@ -67,13 +63,12 @@ def test_a_closed_isoline_has_no_gap(view: View, sphere: str, level: float) -> N
 def test_what_is_not_reached_is_told(view: View) -> None:
     view.open()
     view.upload("two.obj", TWO_SHEETS)
-    ask(view, "#sources", "v0")
+    view.ask("v0")
     view.wait()
-    assert view.text("#notes").splitlines() == ["3 vertices not connected to a source."]
+    assert view.text("#notes").splitlines() == ["3 vertices not connected to a start."]
     assert "2 connected components" in view.text("#report"), "the mesh's own warnings are here"
 
-    view.page.click("#more-points > summary")
-    ask(view, "#max-distance", "0.5")
+    view.ask("0.5", "#max-distance")
     view.wait()
     assert "2 vertices beyond the limit." in view.text("#notes")
 
@@ -81,6 +76,7 @@ def test_what_is_not_reached_is_told(view: View) -> None:
 def test_the_error_bound_is_told(view: View, knot: str) -> None:
     view.open(f"/?mesh={knot}&source=v0&error=0.1")
     assert view.text("#notes") == ""
+    view.unfold("more-method")
     view.page.click("#methods >> text=Approximate")
     view.wait()
     assert "Distances: error at most 0.2 % (guaranteed)." in view.text("#notes")
@@ -139,30 +135,30 @@ def test_a_position_far_from_the_surface_is_told(view: View, sphere: str) -> Non
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("v99999999", "Source: vertex 99999999 does not exist; the indices are 0 to 2561"),
-        ("e0-99999999:0.5", "Source: vertex 99999999 does not exist; the indices are 0 to 2561"),
-        ("f99999999:0.5,0.5,0", "Source: face 99999999 does not exist; the indices are 0 to 5119"),
+        ("v99999999", "vertex 99999999 does not exist; the indices are 0 to 2561"),
+        ("e0-99999999:0.5", "vertex 99999999 does not exist; the indices are 0 to 2561"),
+        ("f99999999:0.5,0.5,0", "face 99999999 does not exist; the indices are 0 to 5119"),
         ("v0 v99999999", "vertex 99999999 does not exist; the indices are 0 to 2561"),
         ("nose", "“nose” is not a point."),
         ("v0 v-1", "“v-1” is not a point."),
     ],
 )
-def test_a_wrong_source_leaves_no_answer(view: View, sphere: str, text: str, words: str) -> None:
+def test_a_wrong_start_leaves_no_answer(view: View, sphere: str, text: str, words: str) -> None:
     view.open(f"/?mesh={sphere}&source=v0&target=v900&lines=none")
     right = length_of(view)
     assert has_path(view)
 
-    ask(view, "#sources", text)
+    view.ask(f"{text} > v900")
     view.wait("error")
 
     assert_blank(view)
     assert words in view.text("#error-detail")
     assert view.text("#error-title") in ("Invalid point", "Not a point")
     assert "/" not in view.text("#error")
-    assert view.page.input_value("#sources") == text
+    assert view.page.input_value("#points") == f"{text} > v900"
     assert view.page.is_disabled("#copy-curl") is (view.text("#error-title") == "Not a point")
 
-    ask(view, "#sources", "v0")
+    view.ask("v0 > v900")
     view.wait()
     assert length_of(view) == right
     assert view.page.is_visible("#legend")
@@ -172,10 +168,10 @@ def test_a_wrong_source_leaves_no_answer(view: View, sphere: str, text: str, wor
 @pytest.mark.parametrize(
     ("field", "text", "title"),
     [
-        ("#target", "v99999999", "Invalid point"),
-        ("#target", "tip", "Not a point"),
-        ("#waypoints", "v99999999", "Invalid point"),
-        ("#waypoints", "v1,v2", "Not a point"),
+        ("#points", "v0 > v99999999", "Invalid point"),
+        ("#points", "v0 > tip", "Not a point"),
+        ("#points", "v0 > v99999999 > v900", "Invalid point"),
+        ("#points", "v0 > v1,v2 > v900", "Not a point"),
         ("#barriers", "99999999", "Invalid request"),
         ("#barriers", "3;4", "Not a range of faces"),
         ("#barriers", "7-6", "Not a range of faces"),
@@ -186,8 +182,7 @@ def test_another_wrong_field_leaves_no_path(
     view: View, sphere: str, field: str, text: str, title: str
 ) -> None:
     view.open(f"/?mesh={sphere}&source=v0&target=v900&lines=none")
-    view.page.click("#more-points > summary")
-    ask(view, field, text)
+    view.ask(text, field)
     view.wait("error")
 
     assert not view.page.is_visible("#readout")
@@ -203,12 +198,12 @@ def test_another_wrong_field_leaves_no_path(
 
 
 def test_a_message_remains_while_lines_are_drawn(view: View, sphere: str) -> None:
-    view.open(f"/?mesh={sphere}&target=v99999999")
+    view.open(f"/?mesh={sphere}")
     with view.page.expect_response("**/isolines"):
-        ask(view, "#sources", "v0")
+        view.ask("v0 > v99999999")
     view.wait("error")
     assert "Target: vertex 99999999" in view.text("#error-detail")
-    assert view.page.is_visible("#legend"), "distances need no target"
+    assert view.page.is_visible("#legend"), "distances need no end"
 
 
 @pytest.mark.parametrize("point", ["nose", "v99999999", "f99999999:1,0,0", "e7-99999999:0.5"])
@@ -230,7 +225,7 @@ def hold(view: View, address: str) -> list[Route]:
 def test_a_slow_answer_leaves_none_in_its_place(view: View, sphere: str) -> None:
     view.open(f"/?mesh={sphere}&source=v0&target=v900&lines=none")
     distances, paths = hold(view, "**/distances"), hold(view, "**/path")
-    ask(view, "#sources", "v7")
+    view.ask("v7 > v900")
     expect(view.page.locator("#readout")).to_be_hidden()
     expect(view.page.locator("#legend")).to_be_hidden()
     assert_blank(view)
@@ -246,14 +241,14 @@ def test_a_failed_question_can_be_asked_again(view: View, sphere: str) -> None:
     view.open(f"/?mesh={sphere}&source=v0&target=v900&lines=none")
     right = length_of(view)
     paths = hold(view, "**/path")
-    ask(view, "#target", "v901")
+    view.ask("v0 > v901")
     expect(view.page.locator("#readout")).to_be_hidden()
     paths[0].abort()
     view.wait("error")
     assert view.text("#error-title") == "The service does not answer"
     assert not view.page.is_visible("#readout")
     view.page.unroute("**/path")
-    ask(view, "#target", "v901")
+    view.ask("v0 > v901")
     view.wait()
     assert length_of(view) == pytest.approx(right, rel=0.5)
 
@@ -262,7 +257,7 @@ def test_a_cancelled_question_leaves_no_answer(view: View, sphere: str) -> None:
     view.open(f"/?mesh={sphere}&source=v0&target=v900&lines=none")
     hold(view, "**/distances")
     hold(view, "**/path")
-    ask(view, "#sources", "v7")
+    view.ask("v7 > v900")
     view.page.keyboard.press("Escape")
     view.wait()
     expect(view.page.locator("#readout")).to_be_hidden()
@@ -272,50 +267,143 @@ def test_a_cancelled_question_leaves_no_answer(view: View, sphere: str) -> None:
 # Beside the mesh
 
 
-@pytest.mark.parametrize("tool", ["Source", "Target", "Via", "Barrier"])
+BESIDE = "That is beside the mesh"
+
+
+@pytest.mark.parametrize("tool", ["A → B", "Stop", "Start", "Barrier"])
 def test_a_click_beside_the_mesh_says_so(view: View, sphere: str, tool: str) -> None:
     view.open(f"/?mesh={sphere}&source=v0&{PLAIN}")
     view.page.click(f"#tools >> text={tool}")
     before = query_of(view)
-    assert view.page.is_hidden("#told")
     view.click(-300, 0)
-    assert view.text("#told") == "That is beside the mesh"
+    assert view.text("#cue") == BESIDE
     assert query_of(view) == before
 
     view.click(10, 10)
-    assert view.page.is_hidden("#told")
+    assert view.text("#cue") != BESIDE
     assert query_of(view) != before
+    view.drag((-300, 0), (-290, 40))
+    assert view.text("#cue") != BESIDE, "that turns the mesh"
 
 
-@pytest.mark.parametrize("key", ["Enter", "t", "v", "Shift+Enter"])
+@pytest.mark.parametrize("key", ["Enter", "Shift+Enter", "Alt+Enter"])
 def test_a_key_beside_the_mesh_says_so(view: View, service: str, key: str) -> None:
     obstacles = sample(service, "knot", 2000)
     view.open(f"/?mesh={obstacles}&lines=none&view=0.6,1.2,2.9,3,0,0")
     view.page.focus("#canvas")
     view.page.keyboard.press(key)
-    assert view.text("#told") == "That is beside the mesh"
-
-
-def test_a_drag_beside_the_mesh_turns_it_without_words(view: View, sphere: str) -> None:
-    view.open(f"/?mesh={sphere}&{PLAIN}")
-    view.drag((-300, 0), (-250, 40))
-    assert view.page.is_hidden("#told")
+    assert view.text("#cue") == BESIDE
 
 
 # Words
 
 
-def test_alt_pulls_while_the_button_is_down(view: View, sphere: str) -> None:
-    view.open(f"/?mesh={sphere}")
-    assert "Hold Alt" not in (view.page.text_content("#hint") or "")
-    assert "Alt-drag" in (view.page.text_content("#hint") or "")
+def test_what_the_pointer_is_told_is_what_it_does(view: View, sphere: str) -> None:
+    """Each sentence in turn: what it says is done, and nothing else."""
     view.open(f"/?mesh={sphere}&{PLAIN}")
-    view.click(-100, 0)
-    view.page.keyboard.down("Alt")
-    view.drag((20, 60), (60, 20), (100, 0))
-    view.page.keyboard.up("Alt")
+
+    def told_and_done(
+        place: tuple[int, int], words: str, *changed: str, key: str | None = None
+    ) -> None:
+        before = query_of(view)
+        if key:
+            view.page.keyboard.down(key)
+        assert view.hover(*place) == words
+        view.click(*place)
+        if key:
+            view.page.keyboard.up(key)
+        after = query_of(view)
+        names = ("source", "via", "target", "walk", "barriers")
+        assert {name for name in names if before.get(name) != after.get(name)} == set(changed)
+
+    told_and_done((-100, 0), "Click sets A, the next one B", "source")
+    told_and_done((100, 0), "Click sets B; Shift-click adds another start", "target")
     assert length_of(view) == pytest.approx(2 * angle_at(view, 100), rel=0.01)
-    assert len(query_of(view)["source"]) == 1
+    adds = "; Shift-click adds a start, Alt-click a stop"
+    told_and_done((-80, 40), f"Click moves A{adds}", "source")
+    told_and_done((80, 40), f"Click moves B{adds}", "target")
+    told_and_done((0, 80), "Alt-click adds stop 1", "via", key="Alt")
+    told_and_done((-80, -60), "Shift-click adds start A2", "source", key="Shift")
+    assert len(query_of(view)["source"]) == 2
+    for tool, place, words, changed in (
+        ("Stop", (0, -40), "Click adds stop 2", "via"),
+        ("Start", (40, -60), "Click adds start A3", "source"),
+        ("Walk", (0, 20), "Click walks straight on from A in this direction", "walk"),
+        ("Barrier", (0, 0), "Drag blocks faces; Shift-drag frees them", "barriers"),
+    ):
+        view.page.click(f"#tools >> text={tool}")
+        told_and_done(place, words, changed)
+    view.page.click("#tools >> text=A → B")
+    assert view.hover(80, 40) == "Drag moves B"
+    before = query_of(view)
+    view.drag((80, 40), (60, 100))
+    after = query_of(view)
+    assert before.pop("target") != after.pop("target")
+    assert before == after
+
+
+def readme_on_clicks() -> list[str]:
+    """Return the sentences of the readme that say what clicks on the page do."""
+    section = (ROOT / "README.md").read_text().split("## The page")[1].split("\n## ")[0]
+    paragraph = next(each for each in section.split("\n\n") if "first click" in each)
+    return [f"{each.strip()}." for each in " ".join(paragraph.split()).split(".") if each.strip()]
+
+
+def test_what_the_readme_says_of_clicks_is_done(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&{PLAIN}")
+
+    def ends() -> None:
+        view.click(-100, 0)
+        view.click(100, 0)
+        assert length_of(view) == pytest.approx(2 * angle_at(view, 100), rel=0.01)
+
+    def nearer_end() -> None:
+        before = query_of(view)
+        view.click(80, 0)
+        assert query_of(view)["source"] == before["source"]
+        assert length_of(view) == pytest.approx(angle_at(view, 100) + angle_at(view, 80), rel=0.01)
+
+    def dragging() -> None:
+        view.drag((-100, 0), (-60, 0))
+        view.drag((80, 0), (60, 0))
+        assert length_of(view) == pytest.approx(2 * angle_at(view, 60), rel=0.01)
+
+    def keys() -> None:
+        view.click(0, 60, "Alt")
+        view.click(-60, 60, "Shift")
+        assert (len(query_of(view)["via"]), len(query_of(view)["source"])) == (1, 2)
+
+    def switch() -> None:
+        assert view.page.is_visible("#legend")
+        view.page.uncheck("#distances")
+        view.wait()
+        assert not view.page.is_visible("#legend")
+        view.page.check("#distances")
+        view.wait()
+        assert view.page.is_visible("#legend")
+
+    def beside() -> None:
+        view.click(-300, 0)
+        assert view.text("#cue") == BESIDE
+
+    def undo() -> None:
+        for _ in range(2 + 1 + 2 + 2 + 2):
+            view.page.keyboard.press("Control+z")
+        assert "source" not in query_of(view)
+
+    performed = {
+        "A first click sets A, a second one B, and the path is there with its length.": ends,
+        "A third click moves the nearer end.": nearer_end,
+        "Dragging moves any point.": dragging,
+        "Shift-click adds a start, and the path begins at the nearest; Alt-click adds a stop on"
+        " the way.": keys,
+        "One switch colours the surface by distance.": switch,
+        "A click beside the mesh says so.": beside,
+        "Ctrl+Z undoes each step.": undo,
+    }
+    assert readme_on_clicks() == list(performed)
+    for perform in performed.values():
+        perform()
 
 
 EVERY_FAULT = """

@@ -53,7 +53,7 @@ def test_a_key_is_asked_for_and_a_wrong_one_refused(view: View) -> None:
     give_key(view.page, KEY)
     view.wait()
     assert not view.page.is_visible("#error")
-    view.page.click("#samples [data-sample=sphere]")
+    view.page.select_option("#meshes", "sample:sphere")
     view.wait()
     view.click(0, 0)
     assert "one piece, closed" in view.text("#report")

@@ -5,7 +5,7 @@ import math
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
@@ -65,11 +65,35 @@ def test_the_page_opens_on_a_coloured_sample_whose_path_follows_the_pointer(view
         lengths.add(view.text("#length"))
     assert len(lengths) > 1, "without a press"
 
-    view.page.click("#samples [data-sample=sphere]")
+    view.page.select_option("#meshes", "sample:sphere")
     view.wait()
     view.page.mouse.move(x, y)
     view.wait()
     assert "target" not in query_of(view)
+
+
+def test_each_story_opens_with_its_answer(view: View) -> None:
+    view.open()
+    assert view.text("h1") == "Geodesic"
+    assert view.text("#about").startswith("Shortest paths and distances along the surface")
+    stories = view.page.locator("#stories a")
+    for i in range(stories.count()):
+        story = stories.nth(i)
+        title = story.locator("strong").inner_text()
+        story.click()
+        view.wait()
+        query = query_of(view)
+        assert (len(query["mesh"]), "sample" in query) == (1, False), title
+        assert view.page.is_visible("#legend"), title
+        if "target" in query:
+            assert length_of(view) > 0, title
+            assert len(seen(view, PATH)) > 50, title
+        else:
+            starts = len(query["source"])
+            assert view.page.locator("#territories li").count() == starts > 1, title
+        assert not view.page.is_visible("#stories ul"), "what is not used is folded"
+        view.unfold("stories")
+    assert i == 3
 
 
 def test_the_axis_upwards_is_guessed_and_can_be_chosen(view: View, service: str) -> None:
@@ -78,7 +102,7 @@ def test_the_axis_upwards_is_guessed_and_can_be_chosen(view: View, service: str)
     assert view.page.is_checked("#ups [value=z]")
     lying = view.pixels()
 
-    open_display(view)
+    view.unfold("more-display")
     view.page.check("#ups [value=y]", force=True)
     view.wait()
 
@@ -90,10 +114,10 @@ def test_the_axis_upwards_is_guessed_and_can_be_chosen(view: View, service: str)
 def test_a_sample_is_loaded_and_a_click_colours_it(view: View) -> None:
     view.open()
     ground = view.colour(-300, -300)
-    view.page.click("#samples [data-sample=sphere]")
+    view.page.select_option("#meshes", "sample:sphere")
     view.wait()
     assert "one piece, closed" in view.text("#report")
-    assert view.page.is_visible("#hint")
+    assert view.text("#cue").endswith("sets A, the next one B")
     clay = view.colour()
     assert np.ptp(clay) < 40
     assert np.abs(clay - ground).max() > 20
@@ -102,12 +126,7 @@ def test_a_sample_is_loaded_and_a_click_colours_it(view: View) -> None:
 
     assert query_of(view)["source"][0].startswith("f")
     assert np.ptp(view.colour(60, 60)) > 40
-    assert not view.page.is_visible("#hint")
-
-
-def open_display(view: View) -> None:
-    """Unfold the rarer controls of the display."""
-    view.page.click("#more-display > summary")
+    assert view.text("#cue") == "Drag moves A"
 
 
 def test_a_file_is_dropped(view: View, wedge: str) -> None:
@@ -136,7 +155,7 @@ def test_a_long_list_of_meshes_goes_on(view: View, sphere: str, knot: str) -> No
 
     view.page.route("**/v1/meshes?*", one_at_a_time)
     view.open()
-    options = view.page.locator("#meshes option")
+    options = view.page.locator("#meshes > option")
 
     def listed() -> list[str]:
         return [option.get_attribute("value") or "" for option in options.all()][1:]
@@ -252,7 +271,7 @@ def test_a_choice_of_colours_and_the_end_of_their_scale(view: View, sphere: str)
     view.open(f"/?mesh={sphere}&{PLAIN}")
     view.click(0, 0)
     teal = view.pixels()
-    open_display(view)
+    view.unfold("more-colours")
     view.page.select_option("#palette", "magma")
     view.page.wait_for_timeout(200)
     magma = view.pixels()
@@ -269,7 +288,7 @@ def test_a_choice_of_colours_and_the_end_of_their_scale(view: View, sphere: str)
     view.wait()
     assert view.page.input_value("#palette") == "magma"
     assert view.text("#tick-2") == "1"
-    view.page.click("#samples [data-sample=knot]")
+    view.page.select_option("#meshes", "sample:knot")
     view.wait()
     assert "range" not in query_of(view), "it belongs to the mesh before"
     assert query_of(view)["palette"] == ["magma"]
@@ -287,21 +306,93 @@ def test_vertices_at_one_position_are_joined_by_a_button(view: View) -> None:
     assert view.page.locator("#report >> text=Join them").count() == 0
 
 
-def test_points_are_told_in_words_and_edited_as_coordinates(view: View, sphere: str) -> None:
-    view.open(f"/?mesh={sphere}&source=v12&target=f7:0.2,0.3,0.5&{PLAIN}")
-    assert view.page.input_value("#sources") == "vertex 12"
-    assert view.page.input_value("#target") == "on face 7"
-    view.page.focus("#target")
-    assert view.page.input_value("#target") == "f7:0.2,0.3,0.5"
-    view.page.fill("#target", "no point")
-    view.page.focus("#sources")
-    assert view.page.input_value("#target") == "no point", "what was typed is not lost"
-    view.page.fill("#target", "v3")
-    view.page.press("#target", "Enter")
+def rows(view: View) -> list[str]:
+    """Return what the list says is set."""
+    return [" ".join(row.split()) for row in view.page.locator("#places li").all_inner_texts()]
+
+
+def test_points_are_listed_in_words_and_edited_as_text(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&source=v12*Old mill&via=v5&target=f7:0.2,0.3,0.5&{PLAIN}")
+    assert rows(view) == ["⠿ A Old mill ×", "⠿ 1 vertex 5 ×", "⠿ B on face 7 ×"]
+    view.unfold("more-points")
+    assert view.page.input_value("#points") == "v12 > v5 > f7:.2,.3"
+    view.page.fill("#points", "v12 > no point")
+    view.page.focus("#max-distance")
+    assert view.page.input_value("#points") == "v12 > no point", "what was typed is not lost"
+    view.wait("error")
+    assert view.page.is_disabled("#undo"), "nothing has been done"
+    view.ask("v12 > v3")
     view.wait()
-    view.page.focus("#sources")
-    assert view.page.input_value("#target") == "vertex 3"
+    assert rows(view) == ["⠿ A Old mill ×", "⠿ B vertex 3 ×"], "names stay with their points"
     assert query_of(view)["target"] == ["v3"]
+
+
+def test_the_list_is_renamed_reordered_and_shortened(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&source=v0&via=v5;v7&target=v9&barriers=3-5&walk=0,1,0&{PLAIN}")
+    assert rows(view)[4:] == ["Straight on from A ×", "Barrier of 3 faces ×"]
+    view.page.dblclick("#places li:nth-child(2) .name")
+    view.page.keyboard.type("Pass; high")
+    view.page.keyboard.press("Enter")
+    assert query_of(view)["via"][0] == "v5*Pass, high"
+    for key, name in (("Escape", "v0"), ("Enter", "v0*Hut")):
+        view.page.focus("#places li:nth-child(1) .name")
+        view.page.keyboard.press("Enter")
+        view.page.keyboard.type("Hut")
+        view.page.keyboard.press(key)
+        assert query_of(view)["source"] == [name]
+
+    view.page.focus("#places li:nth-child(4) .handle")
+    for _ in range(3):
+        view.page.keyboard.press("ArrowUp")
+    view.wait()
+    assert query_of(view)["source"] == ["v9"], "by the keyboard, whose focus goes along"
+    handles = view.page.locator("#places .handle")
+    handles.nth(0).drag_to(handles.nth(2))
+    view.wait()
+    moved = query_of(view)
+    assert (moved["source"], moved["via"]) == (["v0*Hut"], ["v5*Pass, high", "v9"])
+    view.page.click("#places >> [aria-label='Remove 2']")
+    view.page.click("#places >> [aria-label='Remove Barrier of 3 faces']")
+    view.page.click("#places >> [aria-label='Remove Straight on from A']")
+    view.wait()
+    assert rows(view) == ["⠿ A Hut ×", "⠿ 1 Pass, high ×", "⠿ B vertex 7 ×"]
+    assert not {"barriers", "walk"} & set(query_of(view))
+
+
+def test_everything_can_be_undone_and_done_again(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&{PLAIN}")
+    told: list[dict[str, list[str]]] = [query_of(view)]
+
+    def step(act: Callable[[], object]) -> None:
+        act()
+        view.wait()
+        told.append(query_of(view))
+        assert told[-1] != told[-2]
+
+    view.unfold("more-colours")
+    step(lambda: view.click(-100, 0))
+    step(lambda: view.click(100, 0))
+    step(lambda: view.drag((100, 0), (60, 60), (0, 60)))
+    step(lambda: view.click(0, -60, "Alt"))
+    step(lambda: view.click(-60, -60, "Shift"))
+    view.page.click("#tools >> text=Barrier")
+    step(lambda: view.drag((20, 20), (40, 40)))
+    step(lambda: view.page.select_option("#palette", "magma"))
+    step(lambda: view.page.uncheck("#distances"))
+    step(lambda: view.page.click("#places >> [aria-label='Remove A']"))
+    step(lambda: view.page.click("#clear"))
+    for before in reversed(told[:-1]):
+        view.page.keyboard.press("Control+z")
+        assert query_of(view) == before
+    assert view.page.is_disabled("#undo")
+    for after in told[1:]:
+        view.page.click("#redo")
+        assert query_of(view) == after
+    view.page.click("#undo")
+    view.page.keyboard.press("Control+Shift+z")
+    view.wait()
+    assert query_of(view) == told[-1]
+    assert not view.page.is_visible("#legend")
 
 
 def test_colours_are_those_of_the_distance(view: View, sphere: str) -> None:
@@ -330,7 +421,8 @@ def test_the_ramp_grows_lighter_evenly(view: View, sphere: str) -> None:
 def test_the_path_follows_the_pointer(view: View, sphere: str) -> None:
     view.open(f"/?mesh={sphere}&{PLAIN}")
     view.click(-100, 0)
-    view.drag((-100, 0), (0, 60), (100, 40))
+    view.click(0, 60)
+    view.drag((0, 60), (50, 60), (100, 40))
 
     angle = angle_at(view, 100), angle_at(view, math.hypot(100, 40))
     directions = math.pi - math.atan2(40, 100)
@@ -343,8 +435,10 @@ def test_the_path_follows_the_pointer(view: View, sphere: str) -> None:
     assert path[:, 0].min() < -90 < 90 < path[:, 0].max()
     assert view.page.get_attribute("#readout", "data-target") == query_of(view)["target"][0]
 
-    view.drag((100, 40), (0, 40))  # the target itself
-    assert seen(view, PATH)[:, 0].max() < 20
+    before = query_of(view)
+    view.drag((-100, 0), (20, 0))  # the other end
+    assert seen(view, PATH)[:, 0].min() > 0
+    assert query_of(view)["target"] == before["target"]
 
 
 SLOW_PATHS = """
@@ -366,18 +460,19 @@ def test_of_targets_the_newest_wins_and_the_superseded_is_aborted(view: View, sp
     view.page.add_init_script(SLOW_PATHS)
     view.open(f"/?mesh={sphere}&{PLAIN}")
     view.click(-100, 0)
-    view.drag((-100, 0), (0, 100), (60, 60), (100, 0), steps=6)
+    view.click(0, 100)
+    view.drag((0, 100), (60, 60), (100, 0), steps=6)
 
     assert view.page.evaluate("window.aborted") >= 1
     assert view.page.get_attribute("#readout", "data-target") == query_of(view)["target"][0]
     assert length_of(view) == pytest.approx(2 * angle_at(view, 100), rel=0.01)
 
 
-def test_alt_sets_a_target_and_shift_adds_a_source(view: View, sphere: str) -> None:
+def test_a_path_begins_at_the_nearest_start(view: View, sphere: str) -> None:
     view.open(f"/?mesh={sphere}&{PLAIN}")
     view.click(-120, 0)
     view.click(120, 0, "Shift")
-    view.click(60, 0, "Alt")
+    view.click(60, 0)
 
     query = query_of(view)
     assert len(query["source"]) == 2
@@ -385,7 +480,7 @@ def test_alt_sets_a_target_and_shift_adds_a_source(view: View, sphere: str) -> N
         angle_at(view, 120) - angle_at(view, 60), rel=0.01
     )  # from the nearer of them
 
-    view.page.click("#shades >> text=Territories")
+    view.page.click("#shades >> text=Nearest")
     view.wait()
     left, right = view.colour(-60, 60), view.colour(60, 60)
     assert left[0] > left[2], "orange"
@@ -411,7 +506,7 @@ def test_territories_keep_their_colours_up_to_the_border(view: View) -> None:
 def test_waypoints_and_barriers(view: View, sphere: str) -> None:
     view.open(f"/?mesh={sphere}&{PLAIN}")
     view.click(-100, 0)
-    view.click(100, 0, "Alt")
+    view.click(100, 0)
     straight = length_of(view)
     assert len(seen(view, BARRIER, 20)) == 0
 
@@ -422,10 +517,10 @@ def test_waypoints_and_barriers(view: View, sphere: str) -> None:
     around = length_of(view)
     assert around > straight * 1.05
 
-    view.page.click("#tools >> text=Via")
+    view.page.click("#tools >> text=Stop")
     view.click(0, 150)
     assert length_of(view) > around
-    assert "via 1" in view.text("#length-note")
+    assert view.text("#length-names") == "A → 1 → B"
 
     view.page.click("#clear")
     view.wait()
@@ -435,7 +530,7 @@ def test_waypoints_and_barriers(view: View, sphere: str) -> None:
 
 def test_exact_and_approximate_side_by_side(view: View, knot: str) -> None:
     view.open(f"/?mesh={knot}&source=v0&error=0.1")
-    view.page.click("#more-method > summary")
+    view.unfold("more-method")
     assert view.text("#bound-approximate") == "–"
 
     view.page.click("#methods >> text=Approximate")
@@ -446,7 +541,7 @@ def test_exact_and_approximate_side_by_side(view: View, knot: str) -> None:
     assert 0 < float(view.text("#measured-approximate").split()[0]) < 10
     assert view.text("#bound-exact") == "0"
 
-    view.page.click("#shades >> text=Difference")
+    view.page.click("#shades >> text=Error")
     view.wait()
 
     assert "guaranteed: 0.2" in view.text("#legend-title")
@@ -471,6 +566,7 @@ def test_a_proof_beside_the_distances(view: View, knot: str) -> None:
     assert view.text("#proof") == found[0]
     assert query_of(view).get("shade") is None
 
+    view.unfold("more-method")
     view.page.click("#methods >> text=Fast")
     view.wait()
     assert not view.page.is_visible("#proof")
@@ -484,7 +580,7 @@ def test_a_fast_answer_has_no_proof(view: View, knot: str) -> None:
 
 def test_fast_distances_beside_exact_ones(view: View, knot: str) -> None:
     view.open(f"/?mesh={knot}&source=v0&effort=1&shade=difference&lines=count:3")
-    view.page.click("#more-method > summary")
+    view.unfold("more-method")
     assert view.text("#bound-fast") == "–"
 
     view.page.click("#methods >> text=Fast")
@@ -503,6 +599,7 @@ def test_fast_distances_beside_exact_ones(view: View, knot: str) -> None:
     assert query_of(view)["effort"] == ["8"]
     assert float(view.text("#bound-fast").split()[0]) < float(estimate)
     assert float(view.text("#measured-fast").split()[0]) < float(measured)
+    view.unfold("export")
     with view.page.expect_download() as downloaded:
         view.page.click("#download-isolines >> text=OBJ")
     assert "\nl " in Path(downloaded.value.path()).read_text()
@@ -510,20 +607,16 @@ def test_fast_distances_beside_exact_ones(view: View, knot: str) -> None:
 
 def test_points_can_be_written(view: View, sphere: str) -> None:
     view.open(f"/?mesh={sphere}&{PLAIN}")
-    view.page.fill("#sources", "v0 p0,0,2")
-    view.page.fill("#target", "f0:0.5,0.5,0")
-    view.page.press("#target", "Enter")
+    view.ask("v0 p0,0,2 > f0:0.5,0.5,0")
     view.page.wait_for_selector("#readout:visible")
     view.wait()
     assert length_of(view) > 0
 
-    view.page.fill("#target", "v99999999")
-    view.page.press("#target", "Enter")
+    view.ask("v0 > v99999999")
     view.wait("error")
     assert "99999999" in view.text("#error-detail")
 
-    view.page.fill("#target", "nonsense")
-    view.page.press("#target", "Enter")
+    view.ask("v0 > nonsense")
     view.page.wait_for_selector("#error-detail:has-text('“nonsense” is not a point.')")
 
 
@@ -533,14 +626,15 @@ def test_points_that_are_located_late_do_not_undo_what_was_written_since(
     held: list[Route] = []
     view.open(f"/?mesh={sphere}&{PLAIN}")
     view.page.route("**/locate", lambda route: route.continue_() if held else held.append(route))
-    view.page.fill("#sources", "v0 p0,0,2")
-    view.page.fill("#target", "v9")
-    view.page.press("#target", "Enter")
+    with view.page.expect_request("**/locate"):
+        view.ask("v0 p0,0,2")
+    view.ask("v0 > v9")
     view.page.wait_for_selector("#readout:visible")
     with view.page.expect_response("**/locate"):
         held[0].continue_()
     view.wait()
     assert view.page.is_visible("#readout")
+    assert query_of(view)["source"] == ["v0"]
 
 
 def test_a_largest_distance(view: View, sphere: str) -> None:
@@ -622,8 +716,7 @@ def test_a_straight_line_follows_the_pointer_and_tells_where_it_ends(
     assert np.abs(line[:, 1]).max() < 12
 
     walk = np.array(query_of(view)["walk"][0].split(","), float)
-    view.page.fill("#walk", ", ".join(map(str, -walk)))
-    view.page.press("#walk", "Enter")
+    view.ask(", ".join(map(str, -walk)), "#walk")
     view.wait()
     assert seen(view, WALK)[:, 0].max() < -80
     view.page.click("#clear")
@@ -633,8 +726,7 @@ def test_a_straight_line_follows_the_pointer_and_tells_where_it_ends(
 
 def test_a_straight_line_ends_at_the_boundary(view: View, service: str) -> None:
     view.open(f"/?mesh={sample(service, 'plane', 50)}&source=v0&walk=0.5,0.25,0&lines=none")
-    view.page.fill("#walk", "5, 2.5, 0")
-    view.page.press("#walk", "Enter")
+    view.ask("5, 2.5, 0", "#walk")
     view.wait()
     assert (
         view.text("#notes") == f"Straight on: {math.sqrt(1.25):.5f} mesh units, up to the boundary."
@@ -653,7 +745,7 @@ def test_the_distance_under_the_pointer_is_told_in_the_unit_of_the_mesh(
 
     value = float(words.removeprefix("≈ ").removesuffix(" mesh units here"))
     assert value == pytest.approx(expected, rel=0.02)
-    open_display(view)
+    view.unfold("more-display")
     view.page.fill("#unit", "mm")
     view.page.press("#unit", "Enter")
     view.wait()
@@ -696,7 +788,7 @@ def test_the_search_step_by_step(view: View, knot: str) -> None:
 def test_wireframe_and_theme(view: View, sphere: str) -> None:
     view.open(f"/?mesh={sphere}&{PLAIN}")
     plain = view.pixels()
-    open_display(view)
+    view.unfold("more-display")
     view.page.check("#wireframe")
     view.wait()
     view.page.wait_for_timeout(200)
@@ -724,8 +816,7 @@ def test_a_long_query_tells_its_progress_and_can_be_cancelled(view: View, large:
     view.page.on(
         "request", lambda each: streams.append(each.url) if "/events" in each.url else None
     )
-    view.page.fill("#sources", "v0")
-    view.page.press("#sources", "Enter")
+    view.ask("v0")
     told = view.page.locator("#progress[value]")
     told.wait_for()
     first = float(told.get_attribute("value") or 0)
@@ -741,8 +832,7 @@ def test_a_long_query_tells_its_progress_and_can_be_cancelled(view: View, large:
     service = view.page.url.split("/?")[0]
     wait_until(lambda: not httpx2.get(f"{service}/v1/jobs").json()["jobs"])
 
-    view.page.fill("#sources", "v1")
-    view.page.press("#sources", "Enter")
+    view.ask("v1")
     told.wait_for()
     view.page.keyboard.press("Escape")
     view.wait()
@@ -756,7 +846,8 @@ def test_a_permalink_restores_points_and_view(view: View, sphere: str) -> None:
     view.open(f"/?mesh={sphere}&lines=none")  # which shift by parts of a pixel
     view.drag((-250, 250), (-150, 200))  # beside the mesh: turns it
     view.click(-50, 0)
-    view.click(80, 30, "Alt")
+    view.click(80, 30)
+    view.unfold("export")
     view.page.click("#copy-link")
     link = view.page.evaluate("navigator.clipboard.readText()")
     before, length = view.pixels(), view.text("#length")
@@ -780,6 +871,7 @@ def test_a_permalink_to_nothing(view: View) -> None:
 
 def test_downloads(view: View, knot: str, tmp_path: Path) -> None:
     view.open(f"/?mesh={knot}&source=v0&target=v1000")
+    view.unfold("export")
     with view.page.expect_download() as download:
         view.page.click("#download-distances >> text=NPY")
     download.value.save_as(tmp_path / "d.npy")
@@ -803,6 +895,7 @@ def test_downloads(view: View, knot: str, tmp_path: Path) -> None:
 def test_copied_programs_run(view: View, knot: str) -> None:
     view.open(f"/?mesh={knot}&source=v4000&source=v0&target=v1000")
     length = length_of(view)
+    view.unfold("export")
     view.page.click("#copy-curl")
     command = view.page.evaluate("navigator.clipboard.readText()")
     view.page.click("#copy-python")
@@ -827,10 +920,16 @@ def test_by_keyboard_alone(view: View, sphere: str) -> None:
     view.wait()
     for _ in range(4):
         keys.press("ArrowRight")
-    keys.press("t")
+    assert view.text("#cue") == "Enter sets B; Shift+Enter adds another start"
+    keys.press("Enter")
     view.wait()
     assert length_of(view) == pytest.approx(4 * 0.12 * math.sin(1.2), rel=0.02)
 
+    keys.press("ArrowRight")
+    keys.press("Alt+Enter")
+    keys.press("ArrowRight")
+    keys.press("Shift+Enter")
+    assert (len(query_of(view)["source"]), len(query_of(view)["via"])) == (2, 1)
     keys.press("e")
     view.wait()
     assert view.page.is_checked("#methods [value=approximate]")
@@ -849,12 +948,17 @@ def test_by_keyboard_alone(view: View, sphere: str) -> None:
 def test_no_fault_of_access(view: View, knot: str, theme: str) -> None:
     axe = ROOT / "app/web/node_modules/axe-core/axe.min.js"
     view.page.emulate_media(color_scheme="dark" if theme == "dark" else "light")
-    for address in ("/", f"/?mesh={knot}&source=v0&source=v10&target=v1000&shade=territories"):
+    asked = f"/?mesh={knot}&source=v0;v10&via=v7&target=v1000&shade=territories&barriers=3"
+    for address in ("/", asked):
         view.open(address)
+        view.page.locator("details").evaluate_all("all => all.forEach(each => each.open = true)")
         view.page.evaluate(axe.read_text())
-        found = view.page.evaluate("axe.run()")
-        faults = [
-            (each["id"], [node["html"][:120] for node in each["nodes"]])
-            for each in found["violations"]
-        ]
-        assert faults == []
+        for width, height in ((1100, 700), (360, 640)):
+            view.page.set_viewport_size({"width": width, "height": height})
+            view.page.locator("#folded").evaluate("each => each.hidden = false")
+            found = view.page.evaluate("axe.run()")
+            faults = [
+                (each["id"], [node["html"][:120] for node in each["nodes"]])
+                for each in found["violations"]
+            ]
+            assert faults == [], (address, width)

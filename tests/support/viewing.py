@@ -2,6 +2,7 @@
 
 import math
 from io import BytesIO
+from time import time
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ class View:
         self.errors: list[str] = []
         self._devtools = page.context.new_cdp_session(page)  # for what Playwright has no words
         self._fingers = 0
+        self._time = time()
         page.on("pageerror", lambda error: self.errors.append(str(error)))
         page.on("console", self._note)
 
@@ -42,6 +44,23 @@ class View:
             self.page.wait_for_timeout(50)
             if there.count():
                 return
+
+    def unfold(self, name: str) -> None:
+        """Open a folded part of the panel."""
+        self.page.click(f"#{name} > summary")
+
+    def ask(self, text: str, field: str = "#points") -> None:
+        """Write something into a field of the question."""
+        if not self.page.is_visible(field):
+            self.unfold("more-points")
+        self.page.fill(field, text)
+        self.page.press(field, "Enter")
+
+    def hover(self, x: float, y: float) -> str:
+        """Move the mouse beside the middle of the mesh; return what is said there."""
+        centre = self.centre
+        self.page.mouse.move(centre[0] + x, centre[1] + y)
+        return self.text("#cue")
 
     def upload(self, name: str, text: str) -> None:
         """Choose a file, and wait until its mesh is shown."""
@@ -77,14 +96,20 @@ class View:
         mouse.up()
         self.wait()
 
-    def touch(self, *places: Pixel) -> None:
-        """Have fingers at places beside the middle, and nowhere else; the first stays the first."""
+    def touch(self, *places: Pixel, after: float = 0.02) -> None:
+        """
+        Have fingers at places beside the middle, and nowhere else; the first stays the first.
+
+        By the browser's clock this is ``after`` so many seconds, however fast the machine is.
+        """
         x, y = self.centre
         points = [{"x": x + a, "y": y + b, "id": finger} for finger, (a, b) in enumerate(places)]
         kind = "touchEnd"
         if points:
             kind = "touchStart" if len(points) > self._fingers else "touchMove"
-        self._devtools.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+        self._time += after
+        event = {"type": kind, "touchPoints": points, "timestamp": self._time}
+        self._devtools.send("Input.dispatchTouchEvent", event)
         self._fingers = len(points)
 
     def throttle_uploads(self, rate: int) -> None:
@@ -96,8 +121,11 @@ class View:
         )
 
     def pixels(self) -> NDArray[np.int64]:
-        """Return what is on the screen, (H, W, 3)."""
+        """Return what is on the screen but for the words that lie on the mesh, (H, W, 3)."""
+        words = "['cue', 'labels'].map(id => document.getElementById(id).style.visibility = '{}')"
+        self.page.evaluate(words.format("hidden"))
         image = Image.open(BytesIO(self.page.screenshot())).convert("RGB")
+        self.page.evaluate(words.format(""))
         return np.asarray(image, np.int64)
 
     def colour(
@@ -118,7 +146,7 @@ def query_of(view: View) -> dict[str, list[str]]:
     view.page.locator("html:not([data-address-due])").wait_for()
     search: dict[str, list[str]] = view.page.evaluate(
         "() => { const q = new URLSearchParams(location.search); const r = {};"
-        "for (const k of q.keys()) r[k] = q.getAll(k); return r; }"
+        "for (const k of q.keys()) r[k] = q.get(k).split(';'); return r; }"
     )
     return search
 

@@ -1,7 +1,7 @@
 // The page's parts and their wiring: users change the state, and every part follows it.
 import { getMesh, makeSample } from "./api/meshes";
 import { getAbout } from "./api/queries";
-import type { MeshDocument } from "./api/types";
+import type { About, MeshDocument } from "./api/types";
 import { Borders } from "./ask/borders";
 import { Fields } from "./ask/fields";
 import { Isolines } from "./ask/isolines";
@@ -10,22 +10,16 @@ import { Routes } from "./ask/routes";
 import { Walks } from "./ask/walks";
 import { byId } from "./dom";
 import { Player } from "./film/player";
-import {
-  dismissHint,
-  foldOnPhone,
-  isDark,
-  setUpAppearance,
-  showHint,
-  tell,
-} from "./panel/appearance";
+import { foldOnPhone, isDark, setFolded, setUpAppearance } from "./panel/appearance";
 import { Controls, located } from "./panel/controls";
 import { ExportPanel } from "./panel/exportPanel";
 import { listenToKeys } from "./panel/keys";
 import { Meshes } from "./panel/meshes";
 import { Notes } from "./panel/notes";
+import { PlaceList } from "./panel/placeList";
 import { Pointer } from "./panel/pointer";
 import { showReport } from "./panel/report";
-import { readState, writeState } from "./state/permalink";
+import { readSample, readState, writeState } from "./state/permalink";
 import { type State, Store, unitOf, withMesh } from "./state/state";
 import { Status } from "./status";
 import { drawRamp } from "./view/legend";
@@ -47,6 +41,7 @@ const walks = new Walks(status, sceneView, notes);
 const routes = new Routes(status, sceneView, notes);
 const meshes = new Meshes(store, status);
 const controls = new Controls(store, status, sceneView, notes);
+const placeList = new PlaceList(store);
 const exportPanel = new ExportPanel(store, status, stage);
 const player = new Player(store, status, sceneView, () => {
   fields.paint(store.state);
@@ -59,28 +54,30 @@ drawRamp(store.state.palette);
 exportPanel.largest = () => fields.of(store.state)?.largest ?? 0;
 exportPanel.nearest = () => routes.source;
 controls.usualSpacing = () => Number(((exportPanel.largest() || 1) / 20).toPrecision(1));
-stage.onMove = (view) => store.update({ view, up: sceneView.mesh?.frame.up ?? null });
+stage.onMove = (view) => store.replace({ view, up: sceneView.mesh?.frame.up ?? null });
 fields.onPaint = (state) => {
   isolines.follow(state);
   borders.follow(state);
   rays.follow(state);
   player.redraw();
+  pointer.rehover();
 };
 setUpAppearance(() => void showWires(store.state));
 
 controls.show(store.state);
+placeList.show(store.state, null);
 
 let opening = new AbortController();
+const stories = byId("stories", HTMLDetailsElement);
 /** The mesh that is shown. */
 let report: MeshDocument | null = null;
 
 store.listen((state, before) => {
   if (state.mesh !== null && (state.mesh !== before.mesh || isTurned(state))) open(state.mesh);
-  if (before.mesh !== null && state.mesh !== before.mesh) pointer.follows = false;
-  if (state.mesh !== before.mesh) foldOnPhone();
-  tell("");
-  if (arePointsOther(state, before)) notes.tell("points", []);
+  if (state.mesh !== before.mesh || pointer.wasExample(before)) makeRoom();
+  if (state.places !== before.places) notes.tell("points", []);
   controls.show(state);
+  placeList.show(state, before);
   exportPanel.show(state);
   fields.follow(state);
   routes.follow(state);
@@ -92,15 +89,18 @@ store.listen((state, before) => {
   if (state.lines !== before.lines) isolines.follow(state);
   if (state.polar !== before.polar) rays.follow(state);
   if (state.wireframe !== before.wireframe) void showWires(state);
-  if (state.sources.length > 0 && !pointer.follows) dismissHint();
   if (sceneView.mesh) sceneView.showPoints(state);
   if (state.barriers !== before.barriers || state.isReadable !== before.isReadable)
     sceneView.showBarriers(state);
+  pointer.follow();
   writeAddress();
 });
 
-function arePointsOther(now: State, before: State): boolean {
-  return (["sources", "target", "waypoints"] as const).some((each) => now[each] !== before[each]);
+/** Fold what is not used now: there is a mesh, or a question. */
+function makeRoom(): void {
+  if (pointer.isExample) return;
+  stories.open = false;
+  foldOnPhone();
 }
 
 function nameUnit(state: State): void {
@@ -140,11 +140,12 @@ function open(mesh: string): void {
     stop.signal.throwIfAborted();
     controls.showUp(sceneView.mesh?.frame.up ?? "y");
     const now = store.state;
-    stage.look(now.view ?? sceneView.viewOf(now));
+    if (now.view) stage.look(now.view);
+    else sceneView.lookAtAll(now);
     report = document;
     notes.begin(report);
     showReport(report, sceneView, unitOf(now), meshes.joiningOf(mesh));
-    if (now.sources.length === 0 || pointer.follows) showHint();
+    pointer.explain();
     sceneView.showPoints(now);
     sceneView.showBarriers(now);
     fields.paint(now);
@@ -180,18 +181,21 @@ function begin(): void {
     meshes.offer(about);
     exportPanel.offer(about);
     void meshes.list().catch((error: unknown) => status.fail(error));
-    const mesh = new URLSearchParams(location.search).get("mesh");
-    const isEmpty = mesh === null && store.state.mesh === null;
-    byId("welcome").hidden = !isEmpty;
-    if (isEmpty && about.samples.includes("knot")) await showExample();
-    if (mesh === null) return;
+    const sample = readSample(location.search);
+    const mesh = sample
+      ? await makeListed(...sample)
+      : new URLSearchParams(location.search).get("mesh");
+    if (mesh === null) {
+      if (store.state.mesh === null) await greet(about);
+      return;
+    }
     const isOpen = mesh === store.state.mesh;
     try {
-      const asked = await located(mesh, readState(location.search));
-      store.update(asked.change);
+      const asked = await located(mesh, { ...readState(location.search), mesh });
+      store.replace(asked.change);
       notes.tell("points", asked.notes);
     } catch (error) {
-      store.update(withMesh(mesh, store.state)); // without the question that cannot be read
+      store.replace(withMesh(mesh, store.state)); // without the question that cannot be read
       throw error;
     } finally {
       if (isOpen) open(mesh); // without a valid key it was not loaded the first time
@@ -199,13 +203,27 @@ function begin(): void {
   });
 }
 
+/** Say what this is, and show an example or, without samples, that there is no mesh yet. */
+async function greet({ samples }: About): Promise<void> {
+  stories.open = true;
+  setFolded(false);
+  byId("welcome").hidden = samples.includes("knot");
+  if (samples.includes("knot")) await showExample();
+}
+
 /** Show a sample that is coloured already; until the first click its path follows the pointer. */
 async function showExample(): Promise<void> {
-  const { id } = await makeSample("knot", 30_000);
-  await meshes.list();
+  const mesh = await makeListed("knot", 30_000);
   if (store.state.mesh !== null) return; // another was chosen meanwhile
-  pointer.follows = true;
-  store.update({ mesh: id, sources: [{ vertex: 0 }], target: { vertex: 9000 } });
+  const [a, b] = [0, 9000].map((vertex) => ({ point: { vertex }, name: "" }));
+  if (a && b) pointer.showExample([a, b], { mesh });
+}
+
+/** Make a sample that the list of meshes has, and return its id. */
+async function makeListed(name: string, faces: number): Promise<string> {
+  const { id } = await makeSample(name, faces);
+  await meshes.list();
+  return id;
 }
 
 status.onKey = () => {

@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
 import { readState, type WrittenState, writeRanges, writeState } from "../src/state/permalink";
 import { INITIAL, PALETTES, type State } from "../src/state/state";
-import { randomPoint } from "./support/points";
+import { placesAt, randomPoint } from "./support/points";
 import { Random } from "./support/random";
 
 function searchOf(state: State): string {
@@ -11,13 +11,13 @@ function searchOf(state: State): string {
 function randomState(random: Random): State {
   const round = (x: number) => Number(x.toFixed(4));
   const view = random.pick([null, Array.from({ length: 6 }, () => round(6 * random.next() - 3))]);
-  const point = () => randomPoint(random);
+  const name = () => random.pick(["", "Hut", "2 * 3", "a&b=c %2A é"]);
+  const places = random.list(5, () => ({ point: randomPoint(random), name: name() }));
   const barriers = new Set(random.list(40, () => random.below(60)));
   return {
     mesh: random.pick([null, "0123456789abcdef", "f46a3f2a"]),
-    sources: random.list(3, point),
-    target: random.pick([null, point()]),
-    waypoints: random.list(3, point),
+    places: places.length > 0 ? places : [],
+    starts: places.length > 0 ? 1 + random.below(places.length) : 1,
     walk: random.pick([null, [random.size(), -random.size(), 0] as [number, number, number]]),
     barriers: [...barriers].sort((a, b) => a - b),
     method: random.pick(["exact", "approximate", "fast"] as const),
@@ -26,6 +26,7 @@ function randomState(random: Random): State {
     maxDistance: random.pick([null, random.size()]),
     isReadable: true,
     unit: random.pick(["", "mm", "µm & more"]),
+    distances: random.pick([true, false]),
     shade: random.pick(["distance", "territories", "difference", "proof"] as const),
     lines: random.pick([null, { count: 1 + random.below(99) }, { spacing: random.size() }]),
     polar: random.pick([true, false]),
@@ -64,13 +65,32 @@ describe("writing", () => {
     const state: State = {
       ...INITIAL,
       mesh: "m",
-      sources: [{ vertex: 0 }, { face: 7, barycentric: [0.2, 0.3, 0.5] }],
-      target: { edge: [1, 2], t: 0.5 },
+      places: [
+        ...placesAt({ vertex: 0 }, { face: 7, barycentric: [0.2, 0.3, 0.5] }, { vertex: 5 }),
+        { point: { edge: [1, 2], t: 0.5 }, name: "Old mill" },
+      ],
+      starts: 2,
       barriers: [40, 3, 42, 41],
     };
     expect(writeState(state)).toBe(
-      "?mesh=m&source=v0&source=f7:0.2,0.3,0.5&target=e1-2:0.5&barriers=3,40-42",
+      "?mesh=m&source=v0;f7:.2,.3&via=v5&target=e1-2:0.5*Old+mill&barriers=3,40-42",
     );
+  });
+
+  test.each(["source", "via"])("ten points take fewer than 400 characters (%s)", (kind) => {
+    const weights = [0.1234, 0.2345, 0.6421] as [number, number, number];
+    const point = (i: number) => ({ face: 1_234_560 + i, barycentric: weights });
+    const state: State = {
+      ...INITIAL,
+      mesh: "3cc29413895dedad8aff0f06a28cd3fa",
+      places: placesAt(...Array.from({ length: 10 }, (_, i) => point(i))),
+      starts: kind === "source" ? 10 : 1,
+      shade: "territories",
+      up: "z",
+      view: [-1.23456, 1.23456, 2.34567, -0.12345, -0.12345, -0.12345],
+    };
+    expect(new URL(writeState(state), "http://127.0.0.1:8000").href.length).toBeLessThan(400);
+    expect(readState(searchOf(state)).places).toEqual(state.places);
   });
 
   test("a mesh with odd characters does not become other parameters", () => {
@@ -87,9 +107,9 @@ describe("reading", () => {
   });
 
   test("positions are read as they are written by hand", () => {
-    const { sources, target } = readState("?source=p1,2,3&target=12");
-    expect(sources).toEqual([{ position: [1, 2, 3] }]);
-    expect(target).toEqual({ vertex: 12 });
+    const { places, starts } = readState("?source=p1,2,3&target=12");
+    expect(places.map(({ point }) => point)).toEqual([{ position: [1, 2, 3] }, { vertex: 12 }]);
+    expect(starts).toBe(1);
   });
 
   test("a point that is none is refused by name", () => {

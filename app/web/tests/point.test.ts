@@ -1,6 +1,13 @@
 import { describe, expect, test } from "vitest";
 import type { Point } from "../src/api/types";
-import { parsePoint, parsePoints, rounded, sayPoint, writePoint } from "../src/state/point";
+import {
+  parsePlaces,
+  parsePoint,
+  rounded,
+  sayPoint,
+  writePlaces,
+  writePoint,
+} from "../src/state/point";
 import { randomPoint } from "./support/points";
 import { Random } from "./support/random";
 
@@ -13,6 +20,7 @@ describe("parsing", () => {
     ["e0-1:1e-3", { edge: [0, 1], t: 0.001 }],
     ["f7:0.2,0.3,0.5", { face: 7, barycentric: [0.2, 0.3, 0.5] }],
     ["f7:1,0,0", { face: 7, barycentric: [1, 0, 0] }],
+    ["f7:.2,.3", { face: 7, barycentric: [0.2, 0.3, 0.5] }],
     ["p1,2,3", { position: [1, 2, 3] }],
     ["p-1.5,+.25,3E2", { position: [-1.5, 0.25, 300] }],
   ])("%s", (text, point) => {
@@ -33,7 +41,7 @@ describe("parsing", () => {
     "e1-2:x",
     "e1-2-3:0.5",
     "f7",
-    "f7:0.5,0.5",
+    "f7:0.5",
     "f7:0.2,0.3,0.5,0",
     "f7:0.2,0.3,",
     "f7:0.2;0.3;0.5",
@@ -47,18 +55,35 @@ describe("parsing", () => {
     expect(() => parsePoint(text)).toThrow(`“${text}” is not a point`);
   });
 
-  test("several points are divided by any white space", () => {
-    expect(parsePoints(" v0\tp0,0,2 \n f0:0.5,0.5,0 ")).toEqual([
+  const none = { places: [], starts: 1 };
+  const pointsIn = (text: string) => parsePlaces(text, none).places.map(({ point }) => point);
+
+  test("several points are divided by any white space, and a comma may be before it", () => {
+    expect(pointsIn(" v0\tp0,0,2 \n f0:0.5,0.5,0 ")).toEqual([
       { vertex: 0 },
       { position: [0, 0, 2] },
       { face: 0, barycentric: [0.5, 0.5, 0] },
     ]);
-    expect(parsePoints("  ")).toEqual([]);
-    expect(() => parsePoints("v0,v1")).toThrow("“v0,v1” is not a point");
+    expect(pointsIn("v0, v1 , v2,")).toEqual([{ vertex: 0 }, { vertex: 1 }, { vertex: 2 }]);
+    expect(parsePlaces("  ", none)).toEqual(none);
+    expect(() => pointsIn("v0,v1")).toThrow("“v0,v1” is not a point");
   });
 
-  test("a comma may be before a blank", () => {
-    expect(parsePoints("v0, v1 , v2,")).toEqual([{ vertex: 0 }, { vertex: 1 }, { vertex: 2 }]);
+  test("a path goes on behind a >", () => {
+    expect(parsePlaces("v0 v1 > v2 > v3", none)).toMatchObject({ starts: 2 });
+    expect(parsePlaces("v0>v9", none)).toMatchObject({ starts: 1 });
+    expect(pointsIn("v0>v9")).toEqual([{ vertex: 0 }, { vertex: 9 }]);
+    expect(parsePlaces("v0 v1", none)).toMatchObject({ starts: 2 });
+  });
+
+  test("names stay with their points, and what is written is read", () => {
+    const named = {
+      places: [0, 1, 2].map((vertex) => ({ point: { vertex }, name: `V${vertex}` })),
+      starts: 1,
+    };
+    expect(writePlaces(named)).toBe("v0 > v1 > v2");
+    expect(parsePlaces(writePlaces(named), named)).toEqual(named);
+    expect(parsePlaces("v2 > v7", named).places.map(({ name }) => name)).toEqual(["V2", ""]);
   });
 });
 
@@ -75,12 +100,12 @@ describe("writing", () => {
 
   test("weights are written to six digits", () => {
     const point: Point = { face: 7, barycentric: [1 / 3, 1 / 3, 1 / 3] };
-    expect(writePoint(point)).toBe("f7:0.333333,0.333333,0.333333");
+    expect(writePoint(point)).toBe("f7:.333333,.333333");
   });
 });
 
 describe("rounding", () => {
-  test("weights keep their sum, and move by less than two millionths", () => {
+  test("weights keep their sum, and move by less than two ten thousandths", () => {
     const random = new Random(2);
     for (let i = 0; i < 2000; i++) {
       const [a, b] = [random.next(), random.next()].sort();
@@ -91,7 +116,7 @@ describe("rounding", () => {
       expect(barycentric[0] + barycentric[1] + barycentric[2]).toBeCloseTo(1, 12);
       for (const [corner, weight] of barycentric.entries()) {
         expect(weight).toBeGreaterThanOrEqual(0);
-        expect(Math.abs(weight - (exact[corner] ?? Number.NaN))).toBeLessThan(2e-6);
+        expect(Math.abs(weight - (exact[corner] ?? Number.NaN))).toBeLessThan(2e-4);
       }
       expect(rounded(point)).toEqual(point);
     }

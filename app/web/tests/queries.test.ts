@@ -15,6 +15,7 @@ import { questionOf } from "../src/ask/fields";
 import { isolinesOf } from "../src/ask/isolines";
 import { INITIAL, type State } from "../src/state/state";
 import { npyOf } from "./support/npy";
+import { placesAt } from "./support/points";
 import { fakeService, inParts, json } from "./support/service";
 
 const { signal } = new AbortController();
@@ -34,7 +35,7 @@ function distances(values: number[], timing = "queue;dur=0.1, compute;dur=12.5")
 }
 
 describe("isolines", () => {
-  const state: State = { ...INITIAL, mesh: "m", sources: [{ vertex: 0 }] };
+  const state: State = { ...INITIAL, mesh: "m", places: placesAt({ vertex: 0 }) };
 
   test("are asked for by number or by distance, up to the largest one", () => {
     expect(isolinesOf(state, { count: 7 }, 3)).toMatchObject({ count: 7, method: "exact" });
@@ -231,7 +232,7 @@ describe("points", () => {
 });
 
 describe("the question of a state", () => {
-  const state: State = { ...INITIAL, mesh: "m", sources: [{ vertex: 1 }], error: 0.05 };
+  const state: State = { ...INITIAL, mesh: "m", places: placesAt({ vertex: 1 }), error: 0.05 };
 
   test("has what differs from the service's defaults", () => {
     expect(questionOf(state, "exact")).toEqual({ sources: [{ vertex: 1 }], method: "exact" });

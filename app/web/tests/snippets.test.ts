@@ -1,10 +1,16 @@
 import { expect, test } from "vitest";
 import { curlOf, pythonOf } from "../src/panel/snippets";
 import { INITIAL, type State } from "../src/state/state";
+import { placesAt } from "./support/points";
 
 const HOST = "https://host:8000/geodesic/";
 const SOURCE = { vertex: 1 };
-const STATE: State = { ...INITIAL, mesh: "m", sources: [SOURCE, { vertex: 2 }] };
+const STATE: State = {
+  ...INITIAL,
+  mesh: "m",
+  places: placesAt(SOURCE, { vertex: 2 }),
+  starts: 2,
+};
 
 /** Return the body within a command or a program. */
 function bodyOf(text: string): unknown {
@@ -14,7 +20,7 @@ function bodyOf(text: string): unknown {
 test("without a target the distances from all sources are asked for", () => {
   const state: State = { ...STATE, method: "approximate", error: 0.05, maxDistance: 2 };
   const body = {
-    sources: STATE.sources,
+    sources: [SOURCE, { vertex: 2 }],
     method: "approximate",
     relative_error: 0.05,
     max_distance: 2,
@@ -31,8 +37,8 @@ test("without a target the distances from all sources are asked for", () => {
 test("with a target the path from the source in question is asked for", () => {
   const state: State = {
     ...STATE,
-    target: { vertex: 9 },
-    waypoints: [{ vertex: 5 }],
+    places: placesAt(SOURCE, { vertex: 5 }, { vertex: 9 }),
+    starts: 1,
     barriers: [7],
   };
   const body = { source: SOURCE, target: { vertex: 9 }, waypoints: [{ vertex: 5 }], barriers: [7] };

@@ -1,5 +1,6 @@
-import { expect, test, vi } from "vitest";
+import { describe, expect, test, vi } from "vitest";
 import { INITIAL, type State, Store, unitOf, withMesh } from "../src/state/state";
+import { placesAt } from "./support/points";
 
 test("a store begins with the initial state", () => {
   expect(new Store().state).toEqual(INITIAL);
@@ -8,9 +9,14 @@ test("a store begins with the initial state", () => {
 test("an update changes what it names and nothing else", () => {
   const store = new Store();
   store.update({ mesh: "m", error: 0.1 });
-  store.update({ sources: [{ vertex: 3 }] });
+  store.update({ places: placesAt({ vertex: 3 }) });
 
-  expect(store.state).toEqual({ ...INITIAL, mesh: "m", error: 0.1, sources: [{ vertex: 3 }] });
+  expect(store.state).toEqual({
+    ...INITIAL,
+    mesh: "m",
+    error: 0.1,
+    places: placesAt({ vertex: 3 }),
+  });
 });
 
 test("an update leaves the state before it as it was", () => {
@@ -56,9 +62,8 @@ test("a new mesh takes along the settings and none of the points", () => {
   const store = new Store();
   store.update({
     mesh: "old",
-    sources: [{ vertex: 1 }],
-    target: { vertex: 2 },
-    waypoints: [{ vertex: 3 }],
+    places: placesAt({ vertex: 1 }, { vertex: 2 }, { vertex: 3 }),
+    starts: 2,
     barriers: [4],
     maxDistance: 5,
     view: [0, 1, 2, 0, 0, 0],
@@ -98,9 +103,98 @@ test("what cannot be read is no question until there is another one", () => {
   store.update({ isReadable: false });
   store.update({ wireframe: true, view: null });
   expect(store.state.isReadable).toBe(false);
-  for (const change of [{ sources: [] }, { target: null }, { barriers: [1] }, { mesh: "m" }]) {
+  for (const change of [{ places: [] }, { starts: 1 }, { barriers: [1] }, { mesh: "m" }]) {
     store.update({ isReadable: false });
     store.update(change);
     expect(store.state.isReadable).toBe(true);
   }
+});
+
+describe("undo", () => {
+  const paletteOf = (store: Store) => store.state.palette;
+
+  test("goes back step by step, and forth again", () => {
+    const store = new Store();
+    const steps: State[] = [store.state];
+    const changes = [
+      { mesh: "m" },
+      { places: placesAt({ vertex: 1 }) },
+      { barriers: [4] },
+      { palette: "magma" as const },
+      { distances: false },
+      { mesh: "other", places: [] },
+    ];
+    for (const change of changes) {
+      store.update(change);
+      steps.push(store.state);
+    }
+    for (const step of steps.toReversed().slice(1)) {
+      store.undo();
+      expect(store.state).toEqual(step);
+    }
+    expect(store.canUndo).toBe(false);
+    store.undo();
+    for (const step of steps.slice(1)) {
+      store.redo();
+      expect(store.state).toEqual(step);
+    }
+    expect(store.canRedo).toBe(false);
+  });
+
+  test("counts no step where nothing changes, nor what is not the user's", () => {
+    const store = new Store();
+    store.update({ palette: "teal" });
+    store.replace({ palette: "magma" });
+    expect(store.canUndo).toBe(false);
+  });
+
+  test("takes back a gesture at once", () => {
+    const store = new Store();
+    store.update({ palette: "magma" });
+    store.beginGesture();
+    for (let i = 1; i < 9; i++) store.update({ maxDistance: i });
+    store.endGesture();
+    expect(store.state.maxDistance).toBe(8);
+    store.undo();
+    expect(store.state.maxDistance).toBeNull();
+    expect(paletteOf(store)).toBe("magma");
+    store.redo();
+    expect(store.state.maxDistance).toBe(8);
+  });
+
+  test("has nothing of a gesture that is abandoned", () => {
+    const store = new Store();
+    store.update({ palette: "magma" });
+    store.beginGesture();
+    store.update({ maxDistance: 3 });
+    store.abandonGesture();
+    expect(store.state.maxDistance).toBeNull();
+    expect(store.canRedo).toBe(false);
+    store.undo();
+    expect(paletteOf(store)).toBe("teal");
+  });
+
+  test("leaves the camera alone, unless another mesh or another axis comes back", () => {
+    const store = new Store();
+    const view = [0, 1, 2, 0, 0, 0];
+    store.update({ mesh: "m" });
+    store.update({ barriers: [4] });
+    store.replace({ view, up: "y" });
+    store.undo();
+    expect(store.state).toMatchObject({ barriers: [], view, up: "y" });
+    store.update({ up: "z", view: null });
+    store.undo();
+    expect(store.state).toMatchObject({ up: "y", view });
+    store.undo();
+    expect(store.state).toMatchObject({ mesh: null, view: null });
+  });
+
+  test("forgets what was undone once something else is done", () => {
+    const store = new Store();
+    store.update({ palette: "magma" });
+    store.undo();
+    store.update({ palette: "turbo" });
+    store.redo();
+    expect(paletteOf(store)).toBe("turbo");
+  });
 });

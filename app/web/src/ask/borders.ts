@@ -22,9 +22,9 @@ export class Borders {
 
   /** Request the borders that `state` shows and that are not drawn yet, and draw them. */
   follow(state: State): void {
-    const { mesh, sources, shade } = state;
+    const { mesh, starts, shade } = state;
     const nearest = this.fields.territories(state);
-    const isDrawn = sources.length > 1 && shade === "territories" && this.sceneView.surface;
+    const isDrawn = starts > 1 && shade === "territories" && this.sceneView.surface;
     if (!mesh || !nearest || !isDrawn) {
       this.drawing.clear();
       return;

@@ -6,7 +6,7 @@ import { byId, count, duration, written } from "../dom";
 import type { LoadedMesh } from "../mesh/loader";
 import type { FacePoint } from "../mesh/picking";
 import type { Notes } from "../panel/notes";
-import { sayPoint } from "../state/point";
+import { nameOf, startsOf } from "../state/places";
 import { type State, unitOf } from "../state/state";
 import { PATIENCE_MS, type Status } from "../status";
 import { hideLegend, showHere, showProof, showScale, showTerritories } from "../view/legend";
@@ -40,8 +40,8 @@ export class Fields {
   ) {}
 
   /** Return the field that is drawn, or null. */
-  of({ method, isReadable }: State): Field | null {
-    return isReadable ? (this.answers[method] ?? null) : null;
+  of(state: State): Field | null {
+    return isAsked(state) ? (this.answers[state.method] ?? null) : null;
   }
 
   /** Return the nearest source of each vertex, where it is drawn; else null. */
@@ -51,9 +51,9 @@ export class Fields {
 
   /** Request what ``state`` needs and has not been answered yet, and paint it. */
   follow(state: State): void {
-    const { mesh, sources, barriers, maxDistance, method, error, effort, shade, isReadable } =
-      state;
-    const asked = [mesh, sources, barriers, maxDistance, method, error, effort, shade, isReadable];
+    const { mesh, barriers, maxDistance, method, error, effort, shade } = state;
+    const sources = isAsked(state) ? startsOf(state) : [];
+    const asked = [mesh, sources, barriers, maxDistance, method, error, effort, shade];
     const requested = JSON.stringify(asked);
     if (requested === this.requested) return;
     this.requested = requested;
@@ -66,7 +66,7 @@ export class Fields {
       delete this.answers.proofs.approximate;
     }
     if (effort !== this.answers.effort) delete this.answers.fast;
-    if (!mesh || sources.length === 0 || !isReadable) this.paint(state);
+    if (!mesh || sources.length === 0) this.paint(state);
     else this.request(mesh, state);
   }
 
@@ -133,7 +133,7 @@ export class Fields {
   }
 
   private paintField(surface: Surface, mesh: LoadedMesh, field: Field, state: State): void {
-    const { shade, sources } = state;
+    const { shade, starts } = state;
     const { exact, nearest } = this.answers;
     const rough = this.answers[roughOf(state)];
     const proof = this.answers.proofs[state.method];
@@ -156,7 +156,7 @@ export class Fields {
     surface.setValues(field.distances, largest);
     if (shade === "territories" && nearest) {
       surface.setTerritories(nearest);
-      showTerritories(sources.map(sayPoint));
+      showTerritories(Array.from({ length: starts }, (_, i) => nameOf(state, i)));
     } else showScale(`Distance in ${unitOf(state)}`, largest);
   }
 
@@ -188,10 +188,14 @@ export class Fields {
   }
 }
 
+function isAsked({ distances, isReadable }: State): boolean {
+  return distances && isReadable;
+}
+
 /** Return the body of a query for distances. */
 export function questionOf(state: State, method: Method): Question {
   return {
-    sources: state.sources as Question["sources"],
+    sources: startsOf(state) as Question["sources"],
     method,
     ...(method === "approximate" ? { relative_error: state.error } : {}),
     ...(method === "fast" ? { effort: state.effort } : {}),
@@ -215,7 +219,7 @@ function notesOn({ bound, unreachable, warnings }: Field, { method, shade }: Sta
     ...(shade === "proof" && method === "fast"
       ? ["Fast distances have no proof: choose another method."]
       : []),
-    ...said(disconnected, "not connected to a source."),
+    ...said(disconnected, "not connected to a start."),
     ...said(beyond_max_distance, "beyond the limit."),
     ...warnings,
   ];

@@ -3,6 +3,7 @@ import { askDistancesOf, askTotalAngle, askTrace, pointOf } from "../api/queries
 import type { Point, StraightLine } from "../api/types";
 import { differences } from "../mesh/frame";
 import type { Notes } from "../panel/notes";
+import { startsOf } from "../state/places";
 import type { State } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
@@ -30,7 +31,8 @@ export class Rays {
 
   /** Request the rays that `state` needs and that are not drawn yet, and draw them. */
   follow(state: State): void {
-    const { mesh, sources, barriers, polar } = state;
+    const { mesh, barriers, polar } = state;
+    const sources = startsOf(state);
     const largest = this.fields.of(state)?.largest ?? 0;
     if (!mesh || !polar || largest === 0 || !this.sceneView.surface) {
       this.drawing.clear();

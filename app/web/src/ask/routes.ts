@@ -5,6 +5,7 @@ import { askRoute, askSteps, pointOf, type RouteQuestion } from "../api/queries"
 import type { Outline, Point, Step } from "../api/types";
 import { byId, count, written } from "../dom";
 import type { Notes } from "../panel/notes";
+import { endOf, nameOf, startsOf, stopsOf } from "../state/places";
 import { writePoint } from "../state/point";
 import { type State, unitOf } from "../state/state";
 import { PATIENCE_MS, type Status } from "../status";
@@ -26,6 +27,7 @@ export class Routes {
   outline: Outline | null = null;
   private requested = "";
   private unit = "";
+  private names: string[] = [];
   private steps: Step[] = [];
   private request: RouteRequest | null = null;
   private clearing = 0;
@@ -53,14 +55,17 @@ export class Routes {
 
   /** Request the path that ``state`` asks for. */
   follow(state: State): void {
-    const { mesh, sources, target, waypoints, barriers, isReadable } = state;
+    const { mesh, barriers, isReadable } = state;
+    const [sources, target, waypoints] = [startsOf(state), endOf(state), stopsOf(state)];
     this.unit = unitOf(state);
+    this.names = state.places.map((_, i) => nameOf(state, i)).slice(state.starts - 1);
+    if (state.starts > 1) this.names[0] = "nearest start";
     this.note();
     const requested = JSON.stringify([mesh, sources, target, waypoints, barriers, isReadable]);
     if (requested === this.requested) return;
     this.requested = requested;
     this.endSteps();
-    const hasPath = mesh !== null && target !== null && sources.length > 0 && isReadable;
+    const hasPath = mesh !== null && target !== null && isReadable;
     this.request = hasPath ? { mesh, sources, target, waypoints, barriers } : null;
     byId("explain-start", HTMLButtonElement).disabled = !hasPath;
     if (this.request) {
@@ -111,10 +116,7 @@ export class Routes {
   }
 
   private show(outline: Outline, request: RouteRequest): void {
-    const { mesh, sources, barriers } = this.request ?? {};
-    const isOfOther =
-      mesh !== request.mesh || sources !== request.sources || barriers !== request.barriers;
-    if (isOfOther) return;
+    if (!this.request || !isPulled(request, this.request)) return;
     clearTimeout(this.clearing);
     this.clearing = 0;
     if (request !== this.request) this.clearSoon(); // a point has been pulled on meanwhile
@@ -132,12 +134,10 @@ export class Routes {
   private note(): void {
     const { outline, unit } = this;
     if (!outline) return;
-    const { length } = outline.waypoints;
     const bound = outline.method === "exact" ? "exact" : boundInWords(outline.error_bound);
     byId("length-note").textContent =
-      outline.length == null
-        ? reason(outline)
-        : `${unit}, ${bound}${length > 0 ? `, via ${length}` : ""}`;
+      outline.length == null ? reason(outline) : `${unit}, ${bound}`;
+    byId("length-names").textContent = this.names.join(" → ");
   }
 
   private explain(): void {
@@ -182,8 +182,15 @@ export class Routes {
   }
 }
 
+/** Whether two requests differ by the points of the path after its start at most. */
+function isPulled(before: RouteRequest, now: RouteRequest): boolean {
+  const fixed = ({ mesh, sources, barriers }: RouteRequest): string =>
+    JSON.stringify([mesh, sources, barriers]);
+  return fixed(before) === fixed(now);
+}
+
 function reason({ reason: code }: Outline): string {
   return code === "disconnected"
-    ? "source and target are not connected"
-    : "the target is farther than the distance limit";
+    ? "start and end are not connected"
+    : "the end is farther than the distance limit";
 }

@@ -4,6 +4,7 @@ import { askTrace, type TraceQuestion } from "../api/queries";
 import type { StraightLine } from "../api/types";
 import { written } from "../dom";
 import type { Notes } from "../panel/notes";
+import { startsOf } from "../state/places";
 import { type State, unitOf } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
@@ -44,9 +45,9 @@ export class Walks {
 
   /** Request the line that ``state`` asks for. */
   follow(state: State): void {
-    const { mesh, sources, walk, barriers, isReadable } = state;
+    const { mesh, walk, barriers, isReadable } = state;
     this.unit = unitOf(state);
-    const [start] = sources;
+    const [start] = startsOf(state);
     const requested = JSON.stringify([mesh, start, walk, barriers, isReadable]);
     if (requested === this.requested) return;
     this.requested = requested;

@@ -3,6 +3,7 @@ import { askSweep } from "../api/queries";
 import { byId } from "../dom";
 import { InputError } from "../inputError";
 import { foldOnPhone } from "../panel/appearance";
+import { startsOf } from "../state/places";
 import { type State, type Store, unitOf } from "../state/state";
 import type { Status } from "../status";
 import { type Rgb, territory } from "../view/colours";
@@ -60,10 +61,11 @@ export class Player {
     this.offer(state);
   }
 
-  private offer({ mesh, sources, isReadable }: State): void {
+  private offer(state: State): void {
+    const { mesh, isReadable } = state;
     const faces = this.sceneView.mesh?.document.faces ?? 0;
     const isSmall = faces <= MOST_FACES;
-    const isAsked = mesh !== null && faces > 0 && sources.length > 0 && isReadable;
+    const isAsked = mesh !== null && faces > 0 && startsOf(state).length > 0 && isReadable;
     byId("film-start", HTMLButtonElement).disabled = !isAsked || !isSmall;
     byId("film-note").textContent =
       faces > 0 && !isSmall
@@ -81,7 +83,8 @@ export class Player {
 
   private begin(): void {
     const { state } = this.store;
-    const { mesh, sources, barriers } = state;
+    const { mesh, barriers } = state;
+    const sources = startsOf(state);
     if (mesh === null) return;
     this.stop.abort();
     this.stop = new AbortController();

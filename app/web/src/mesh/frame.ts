@@ -29,6 +29,49 @@ export function drawnIn({ centre, radius, up }: Frame, position: readonly number
   return up === "y" ? [x, y, z] : [x, z, -y];
 }
 
+/** What a view from the side shows of the end of a mesh, of its height and of its side. */
+const ASIDE = { end: 0.5, height: 0.35, side: 0.8 };
+/** A mesh is seen from its side if it is longer than wide by this factor. */
+const LONG = 1.2;
+
+/** The mean of the normals is this long at least where one side has more detail. */
+const TELLING = 0.015;
+/** The share of the height that is the top of a mesh. */
+const TOP = 0.15;
+
+/**
+ * Return the direction from which a mesh is looked at first, in drawn positions.
+ *
+ * What is long is seen from the side, and turned towards its front: the end with more detail, which
+ * has more vertices, so that the mean of their normals points there as it does out of an open
+ * surface; otherwise the end that rises higher, as heads do.
+ */
+export function frontOf(positions: ArrayLike<number>, normals: ArrayLike<number>): Triple {
+  const { low, high } = boxOf(positions, () => true);
+  const [width, tall, depth] = differences(high, low) as Triple;
+  const detail = meanOf(normals, () => true);
+  const floor = high[1] - TOP * tall;
+  const top = meanOf(positions, (i) => positions[i + 1]! >= floor);
+  const signOf = (axis: 0 | 2): number => {
+    const telling = Math.abs(detail[axis]) > TELLING ? detail[axis] : top[axis];
+    return telling < -TELLING ? -1 : 1;
+  };
+  const { end, height, side } = ASIDE;
+  const [x, z] = depth > LONG * width ? [side, end] : [end, side];
+  return [signOf(0) * x, height, signOf(2) * z];
+}
+
+function meanOf(points: ArrayLike<number>, isChosen: (index: number) => boolean): Triple {
+  const sum: Triple = [0, 0, 0];
+  let count = 0;
+  for (let i = 0; i < points.length; i += 3) {
+    if (!isChosen(i)) continue;
+    count += 1;
+    for (let axis = 0; axis < 3; axis++) sum[axis]! += points[i + axis]!;
+  }
+  return sum.map((x) => x / (count || 1)) as Triple;
+}
+
 /** Return the vector from a position to another one. */
 export function differences(to: readonly number[], from: readonly number[]): Triple {
   return to.map((x, axis) => x - (from[axis] ?? 0)) as Triple;

@@ -4,6 +4,9 @@ import type { MeshBVH } from "three-mesh-bvh";
 import type { Point } from "../api/types";
 import type { LoadedMesh } from "./loader";
 
+/** What is no farther in front of a position, in radii of the mesh, does not hide it. */
+const CLOSE = 0.01;
+
 export type FacePoint = Extract<Point, { face: number }>;
 
 /** Return the point of the surface under ``x``, ``y`` (-1 to 1, y upwards), or null where there is none. */
@@ -22,6 +25,14 @@ export function pick(
     .corners(hit.faceIndex)
     .map((v) => new Vector3(...mesh.drawn(mesh.vertex(v))));
   return { face: hit.faceIndex, barycentric: weights(a!, b!, c!, hit.point) };
+}
+
+/** Whether nothing of the surface is between the camera and a drawn position of it. */
+export function isSeen(tree: MeshBVH, camera: Camera, position: readonly number[]): boolean {
+  const origin = new Vector3().setFromMatrixPosition(camera.matrixWorld);
+  const way = new Vector3(...position).sub(origin);
+  const hit = tree.raycastFirst(new Ray(origin, way.clone().normalize()), DoubleSide);
+  return hit === null || hit.distance > way.length() - CLOSE;
 }
 
 /** Return the barycentric weights of a point, none below 0, with sum 1. */

@@ -1,9 +1,7 @@
-// Appearance: dark or light, the folded panel, the hint.
+// Appearance: dark or light, the folded panel.
 import { byId } from "../dom";
 
 const THEME = "geodesic-theme";
-const HINT = "geodesic-hint";
-const TOLD_MS = 4000;
 
 export function setUpAppearance(onTheme: () => void): void {
   const dark = matchMedia("(prefers-color-scheme: dark)");
@@ -20,10 +18,9 @@ export function setUpAppearance(onTheme: () => void): void {
   apply();
   byId("fold").addEventListener("click", () => setFolded(!byId("folded").hidden));
   foldOnPhone();
-  byId("hint-close").addEventListener("click", dismissHint);
 }
 
-function setFolded(isFolded: boolean): void {
+export function setFolded(isFolded: boolean): void {
   byId("folded").hidden = isFolded;
   byId("fold").setAttribute("aria-expanded", String(!isFolded));
 }
@@ -33,24 +30,6 @@ export function foldOnPhone(): void {
   if (matchMedia("(max-width: 46rem)").matches) setFolded(true);
 }
 
-let telling = 0;
-
-/** Tell in a few words what became of a click or a key: for a while, or until something changes. */
-export function tell(words: string): void {
-  clearTimeout(telling);
-  byId("told").textContent = words;
-  if (words) telling = setTimeout(() => tell(""), TOLD_MS);
-}
-
 export function isDark(): boolean {
   return document.documentElement.dataset.theme === "dark";
-}
-
-export function showHint(): void {
-  byId("hint").hidden = localStorage.getItem(HINT) !== null;
-}
-
-export function dismissHint(): void {
-  byId("hint").hidden = true;
-  localStorage.setItem(HINT, "seen");
 }

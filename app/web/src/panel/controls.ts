@@ -5,10 +5,12 @@ import type { Effort, Method, Point } from "../api/types";
 import { byId, query, written } from "../dom";
 import type { Up } from "../mesh/frame";
 import { LONGEST_UNIT, readState, type WrittenState, writeRanges } from "../state/permalink";
-import type { WrittenPoint } from "../state/point";
+import { nameOf, type Place, type Tool } from "../state/places";
+import { parsePlaces, type WrittenPoint, writePlaces } from "../state/point";
 import {
   INITIAL,
   type Lines,
+  NO_QUESTION,
   type Palette,
   type Shade,
   type State,
@@ -17,23 +19,13 @@ import {
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
 import type { Notes } from "./notes";
-import type { Tool } from "./pointer";
-import { PointField } from "./pointField";
 
 /** Positions that are this many edges from the surface, at most, are on it: they were rounded. */
 const FAR = 0.1;
 
-type Question = Pick<
-  WrittenState,
-  "sources" | "target" | "waypoints" | "walk" | "barriers" | "maxDistance"
->;
-type Located<Q> = Omit<Q, "sources" | "target" | "waypoints"> &
-  Pick<State, "sources" | "target" | "waypoints">;
+type Question = Pick<WrittenState, "places" | "starts" | "walk" | "barriers" | "maxDistance">;
 
 export class Controls {
-  private readonly sources = new PointField("sources");
-  private readonly target = new PointField("target");
-  private readonly waypoints = new PointField("waypoints");
   private reading = new AbortController();
 
   constructor(
@@ -42,21 +34,17 @@ export class Controls {
     sceneView: SceneView,
     private readonly notes: Notes,
   ) {
-    byId("points").addEventListener("submit", (event) => {
+    byId("question").addEventListener("submit", (event) => {
       event.preventDefault();
-      this.readPoints();
+      this.readQuestion();
     });
-    byId("points").addEventListener("change", () => this.readPoints());
-    byId("clear").addEventListener("click", () => {
-      store.update({
-        sources: [],
-        target: null,
-        waypoints: [],
-        walk: null,
-        barriers: [],
-        maxDistance: null,
-      });
-    });
+    byId("question").addEventListener("change", () => this.readQuestion());
+    byId("clear").addEventListener("click", () => store.update(NO_QUESTION));
+    byId("undo").addEventListener("click", () => store.undo());
+    byId("redo").addEventListener("click", () => store.redo());
+    byId("distances").addEventListener("change", () =>
+      store.update({ distances: byId("distances", HTMLInputElement).checked }),
+    );
     onChoice("methods", (method) => store.update({ method: method as Method }));
     onChoice("ups", (up) => store.update({ up: up as Up, view: null }));
     onChoice("shades", (shade) => store.update({ shade: shade as Shade }));
@@ -89,8 +77,8 @@ export class Controls {
       store.update({ wireframe: byId("wireframe", HTMLInputElement).checked }),
     );
     byId("fit").addEventListener("click", () => {
-      sceneView.stage.look(null);
-      store.update({ view: null });
+      sceneView.stage.lookAtAll();
+      store.replace({ view: null });
     });
   }
 
@@ -106,14 +94,16 @@ export class Controls {
   /** Show ``state`` in all fields. */
   show(state: State): void {
     if (state.isReadable) this.showQuestion(state);
-    if (
-      state.waypoints.length > 0 ||
-      state.walk ||
-      state.barriers.length > 0 ||
-      state.maxDistance !== null
-    )
-      byId("more-points", HTMLDetailsElement).open = true;
+    byId("undo", HTMLButtonElement).disabled = !this.store.canUndo;
+    byId("redo", HTMLButtonElement).disabled = !this.store.canRedo;
+    byId("distances", HTMLInputElement).checked = state.distances;
+    const names = state.places.slice(0, state.starts).map((_, i) => nameOf(state, i));
+    byId("distances-from").textContent =
+      names.length > 2 ? `the nearest of ${names.length} starts` : names.join(" and ") || "A";
+    byId("shown-distances").hidden = !state.distances;
+    if (state.maxDistance !== null) byId("more-points", HTMLDetailsElement).open = true;
     choose("methods", state.method);
+    byId("method-now").textContent = state.method;
     byId("epsilon").hidden = state.method !== "approximate";
     byId("efforts").hidden = state.method !== "fast";
     choose("shades", state.shade);
@@ -137,15 +127,13 @@ export class Controls {
 
   /** Show the question; what cannot be read stays as it was typed. */
   private showQuestion(state: State): void {
-    this.sources.show(state.sources);
-    this.target.show(state.target ? [state.target] : []);
-    this.waypoints.show(state.waypoints);
+    setValue("points", writePlaces(state));
     setValue("walk", state.walk?.join(", ") ?? "");
     setValue("barriers", writeRanges(state.barriers));
     setValue("max-distance", state.maxDistance === null ? "" : String(state.maxDistance));
   }
 
-  private readPoints(): void {
+  private readQuestion(): void {
     const { mesh } = this.store.state;
     if (mesh === null) return;
     this.reading.abort(); // what was written before could be located later
@@ -158,7 +146,7 @@ export class Controls {
         this.store.update(change);
         this.notes.tell("points", notes);
       } catch (error) {
-        if (!reading.signal.aborted) this.store.update({ isReadable: false });
+        if (!reading.signal.aborted) this.store.replace({ isReadable: false });
         throw error;
       }
     });
@@ -173,10 +161,8 @@ export class Controls {
       max_distance: text("max-distance"),
     };
     const { walk, barriers, maxDistance } = readState(new URLSearchParams(others).toString());
-    const [sources, targets, waypoints] = [this.sources, this.target, this.waypoints].map((field) =>
-      field.read(),
-    ) as [WrittenPoint[], WrittenPoint[], WrittenPoint[]];
-    return { sources, target: targets[0] ?? null, waypoints, walk, barriers, maxDistance };
+    const { places, starts } = parsePlaces(text("points"), this.store.state);
+    return { places, starts, walk, barriers, maxDistance };
   }
 
   private readLines(isOtherKind: boolean): void {
@@ -199,10 +185,10 @@ export class Controls {
  *
  * The notes tell how far from the surface they are, where that is much.
  */
-export async function located<Q extends Pick<WrittenState, "sources" | "target" | "waypoints">>(
+export async function located<Q extends Pick<WrittenState, "places">>(
   mesh: string,
   question: Q,
-): Promise<{ change: Located<Q>; notes: string[] }> {
+): Promise<{ change: Omit<Q, "places"> & Pick<State, "places">; notes: string[] }> {
   const notes: string[] = [];
   const pointOf = async (given: WrittenPoint): Promise<Point> => {
     if (!("position" in given)) return given;
@@ -216,13 +202,12 @@ export async function located<Q extends Pick<WrittenState, "sources" | "target" 
     }
     return point;
   };
-  const { sources, target, waypoints } = question;
-  const [first, last, between] = await Promise.all([
-    Promise.all(sources.map(pointOf)),
-    target && pointOf(target),
-    Promise.all(waypoints.map(pointOf)),
-  ]);
-  return { change: { ...question, sources: first, target: last, waypoints: between }, notes };
+  const places = await Promise.all(
+    question.places.map(async ({ point, name }): Promise<Place> => {
+      return { point: await pointOf(point), name };
+    }),
+  );
+  return { change: { ...question, places }, notes };
 }
 
 function errorOf(slider: HTMLInputElement): number {

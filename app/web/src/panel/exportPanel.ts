@@ -6,6 +6,7 @@ import { questionOf } from "../ask/fields";
 import { isolinesOf } from "../ask/isolines";
 import { button, byId, download } from "../dom";
 import { writeState } from "../state/permalink";
+import { endOf, startsOf, stopsOf } from "../state/places";
 import type { State, Store } from "../state/state";
 import type { Status } from "../status";
 import type { Stage } from "../view/scene";
@@ -67,12 +68,12 @@ export class ExportPanel {
 
   /** Enable the exports that ``state`` has answers for. */
   show(state: State): void {
-    const hasField = state.mesh !== null && state.sources.length > 0 && state.isReadable;
+    const hasField = state.mesh !== null && state.places.length > 0 && state.isReadable;
     const has = {
       distances: hasField,
-      path: hasField && state.target !== null,
+      path: hasField && endOf(state) !== null,
       isolines: hasField && state.lines !== null,
-      borders: hasField && state.sources.length > 1,
+      borders: hasField && state.starts > 1,
     };
     for (const [what, isThere] of Object.entries(has)) {
       for (const choice of byId(`download-${what}`).querySelectorAll("button"))
@@ -95,7 +96,8 @@ export class ExportPanel {
 
   private bodyOf(what: Product): unknown {
     const { state } = this.store;
-    const { target, waypoints, barriers, lines } = state;
+    const { barriers, lines } = state;
+    const [target, waypoints] = [endOf(state), stopsOf(state)];
     if (what === "path") return { source: this.source(), target, waypoints, barriers };
     if (what === "borders") return bordersOf(state);
     if (what === "distances" || lines === null) return questionOf(state, state.method);
@@ -109,7 +111,7 @@ export class ExportPanel {
   nearest: () => Point | null = () => null;
 
   private source(): Point {
-    const source = this.nearest() ?? this.store.state.sources[0];
+    const source = this.nearest() ?? startsOf(this.store.state)[0];
     if (!source) throw new Error("There is no source yet.");
     return source;
   }

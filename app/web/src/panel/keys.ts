@@ -4,7 +4,7 @@ import { byId } from "../dom";
 import { INITIAL, type Store } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
-import type { Pointer, Tool } from "./pointer";
+import type { Pointer } from "./pointer";
 
 const STEP = 0.12;
 const NEXT: Record<Method, Method> = { exact: "approximate", approximate: "fast", fast: "exact" };
@@ -16,8 +16,6 @@ export function listenToKeys(
   pointer: Pointer,
 ): void {
   const { stage } = sceneView;
-  const inTheMiddle = (tool: Tool, adds = false): void =>
-    pointer.set(sceneView.pick(0, 0), tool, adds);
   const onMesh: Record<string, (event: KeyboardEvent) => void> = {
     ArrowLeft: () => stage.turn(-STEP, 0),
     ArrowRight: () => stage.turn(STEP, 0),
@@ -26,10 +24,7 @@ export function listenToKeys(
     "+": () => stage.turn(0, 0, 1.15),
     "=": () => stage.turn(0, 0, 1.15),
     "-": () => stage.turn(0, 0, 1 / 1.15),
-    Enter: (event) => inTheMiddle("source", event.shiftKey),
-    t: () => inTheMiddle("target"),
-    v: () => inTheMiddle("waypoint"),
-    g: () => inTheMiddle("walk"),
+    Enter: (event) => pointer.press(event),
   };
   const anywhere: Record<string, () => void> = {
     Escape: () => status.cancel(),
@@ -41,10 +36,19 @@ export function listenToKeys(
   };
   document.addEventListener("keydown", (event) => {
     const isTyping =
-      event.target instanceof HTMLInputElement || event.target instanceof HTMLSelectElement;
-    if (event.ctrlKey || event.metaKey || event.altKey || (isTyping && event.key !== "Escape"))
-      return;
+      (event.target instanceof HTMLInputElement &&
+        !["checkbox", "radio", "range"].includes(event.target.type)) ||
+      event.target instanceof HTMLSelectElement;
+    if (isTyping && event.key !== "Escape") return;
     const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+    if (event.ctrlKey || event.metaKey) {
+      if (key !== "z" && key !== "y") return;
+      event.preventDefault();
+      if (key === "y" || event.shiftKey) store.redo();
+      else store.undo();
+      return;
+    }
+    if (event.altKey && key !== "Enter") return;
     const act = (event.target === stage.canvas ? onMesh[key] : undefined) ?? anywhere[key];
     if (!act) return;
     event.preventDefault();

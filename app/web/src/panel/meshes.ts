@@ -1,17 +1,19 @@
 // Choosing a mesh: from a file, from a sample or from the store.
 import { listMeshes, makeSample, uploadMesh } from "../api/meshes";
 import type { About, ListedMesh, MeshDocument } from "../api/types";
-import { button, byId, count } from "../dom";
+import { byId, count } from "../dom";
 import { InputError } from "../inputError";
 import { type Store, withMesh } from "../state/state";
 import type { OnProgress, Status } from "../status";
 
-const SAMPLES = [
-  ["knot", "Knot", 30_000],
-  ["sphere", "Sphere", 20_000],
-  ["terrain", "Terrain", 40_000],
-  ["obstacles", "Obstacles", 20_000],
-] as const;
+/** Samples, with as many faces as are drawn smoothly. */
+const SAMPLES: Record<string, number> = {
+  knot: 30_000,
+  sphere: 20_000,
+  terrain: 40_000,
+  cortex: 40_000,
+  obstacles: 20_000,
+};
 
 /** What a file is that is no mesh, by its media type. The service tells what is wrong with others. */
 const NO_MESHES: [RegExp, string][] = [
@@ -22,29 +24,22 @@ const NO_MESHES: [RegExp, string][] = [
 /** Texts by their names: the media type of a mesh may be that of a text. */
 const TEXT = /\.(txt|md|csv|html?|log)$/i;
 
-/** The value of the option that lists more of the store; no mesh has this id. */
+/** The value of the option that lists more of the store, and the start of those that make samples. */
 const MORE = "more";
+const SAMPLE = "sample:";
 
 export class Meshes {
   /** Files of this visit by the id of their mesh, to send again with its vertices joined. */
   private readonly files = new Map<string, File>();
   private formats = "";
   private readonly select = byId("meshes", HTMLSelectElement);
+  private readonly samples = document.createElement("optgroup");
 
   constructor(
     private readonly store: Store,
     private readonly status: Status,
   ) {
-    for (const place of ["samples", "welcome-samples"]) {
-      const buttons = SAMPLES.map(([name, title, faces]) => {
-        const choice = button(title, () =>
-          this.create(`Making ${title}…`, () => makeSample(name, faces)),
-        );
-        choice.dataset.sample = name;
-        return choice;
-      });
-      byId(place).append(...buttons);
-    }
+    this.samples.label = "Samples";
     const file = byId("file", HTMLInputElement);
     for (const id of ["pick", "welcome-pick"])
       byId(id).addEventListener("click", () => file.click());
@@ -55,25 +50,25 @@ export class Meshes {
     this.select.addEventListener("change", () => {
       const id = this.select.value;
       if (id === MORE) this.listMore();
+      else if (id.startsWith(SAMPLE)) this.make(id.slice(SAMPLE.length));
       else if (id) store.update(withMesh(id, store.state));
     });
     this.acceptDrops();
   }
 
-  /** Name the formats that this service reads, and hide the samples that it does not make. */
+  /** Name the formats that this service reads, and the samples that it makes. */
   offer({ samples, mesh_formats }: Pick<About, "samples" | "mesh_formats">): void {
     this.formats = mesh_formats.map((format) => format.toUpperCase()).join(", ");
     byId("welcome-formats").textContent = this.formats;
-    for (const choice of document.querySelectorAll<HTMLButtonElement>("[data-sample]")) {
-      choice.hidden = !samples.includes(choice.dataset.sample ?? "");
-    }
+    const made = Object.keys(SAMPLES).filter((name) => (samples as string[]).includes(name));
+    this.samples.replaceChildren(...made.map((name) => new Option(titleOf(name), SAMPLE + name)));
   }
 
   /** List the meshes of the store, and select the one that is open. */
   async list(): Promise<void> {
     const options = await this.listed(null);
     const title = options.length > 0 ? "In the store…" : "The store is empty";
-    this.select.replaceChildren(new Option(title, ""), ...options);
+    this.select.replaceChildren(new Option(title, ""), ...options, this.samples);
     this.showChosen();
   }
 
@@ -122,6 +117,11 @@ export class Meshes {
     });
   }
 
+  private make(name: string): void {
+    this.showChosen();
+    this.create(`Making ${titleOf(name)}…`, () => makeSample(name, SAMPLES[name] ?? 0));
+  }
+
   private create(
     words: string,
     make: (onProgress: OnProgress, signal: AbortSignal) => Promise<MeshDocument>,
@@ -150,6 +150,10 @@ export class Meshes {
       if (file) this.upload(file);
     });
   }
+}
+
+function titleOf(sample: string): string {
+  return sample.slice(0, 1).toUpperCase() + sample.slice(1);
 }
 
 function nameOf({ id, name, faces }: ListedMesh): string {

@@ -1,6 +1,7 @@
 // The current query as a curl command and as a Python program.
 import type { Point } from "../api/types";
 import { questionOf } from "../ask/fields";
+import { endOf, stopsOf } from "../state/places";
 import type { State } from "../state/state";
 
 interface Query {
@@ -10,7 +11,8 @@ interface Query {
 
 /** Return the query for the path where there is a target, otherwise for the distances. */
 function queryOf(state: State, source: Point): Query {
-  const { target, waypoints, barriers } = state;
+  const { barriers } = state;
+  const [target, waypoints] = [endOf(state), stopsOf(state)];
   const mesh = `v1/meshes/${state.mesh}`;
   if (!target) return { path: `${mesh}/distances`, body: questionOf(state, state.method) };
   const more = {
@@ -29,7 +31,7 @@ export function curlOf(state: State, source: Point, service: string, hasKey: boo
 export function pythonOf(state: State, source: Point, service: string, hasKey: boolean): string {
   const { path, body } = queryOf(state, source);
   const key = hasKey ? `, "Authorization": "Bearer " + os.environ["GEODESIC_KEY"]` : "";
-  const results = state.target ? `answer["length"], answer["points"]` : `answer["distances"]`;
+  const results = endOf(state) ? `answer["length"], answer["points"]` : `answer["distances"]`;
   return [
     "import json",
     ...(hasKey ? ["import os"] : []),

@@ -1,29 +1,34 @@
-// The state as the page's address, and back: /?mesh=ID&source=v0&target=v99
+// The state as the page's address, and back: /?mesh=ID&source=v0*Home&target=v99
 import type { Effort, Method } from "../api/types";
 import { InputError } from "../inputError";
 import type { Triple, Up } from "../mesh/frame";
+import type { Place } from "./places";
 import { parsePoint, type WrittenPoint, writePoint } from "./point";
 import { INITIAL, type Lines, PALETTES, type Palette, type Shade, type State } from "./state";
 
-/** Characters of the name of a unit. */
+/** Characters of the name of a unit, and of a point. */
 export const LONGEST_UNIT = 12;
+export const LONGEST_NAME = 24;
 const EFFORTS: Effort[] = [1, 2, 4, 8];
 /** No mesh has more faces. */
 const MOST_FACES = 1e8;
 
 /** A state whose points may still be positions, which the service has to locate. */
-export type WrittenState = Omit<State, "sources" | "target" | "waypoints"> & {
-  sources: WrittenPoint[];
-  target: WrittenPoint | null;
-  waypoints: WrittenPoint[];
-};
+export type WrittenState = Omit<State, "places"> & { places: readonly Place<WrittenPoint>[] };
 
 export function writeState(state: State): string {
   const query = new URLSearchParams();
   if (state.mesh) query.set("mesh", state.mesh);
-  for (const source of state.sources) query.append("source", writePoint(source));
-  if (state.target) query.set("target", writePoint(state.target));
-  for (const waypoint of state.waypoints) query.append("via", writePoint(waypoint));
+  const { places, starts } = state;
+  const hasEnd = places.length > starts;
+  const parts = {
+    source: places.slice(0, starts),
+    via: places.slice(starts, -1),
+    target: hasEnd ? places.slice(-1) : [],
+  };
+  for (const [name, part] of Object.entries(parts)) {
+    if (part.length > 0) query.set(name, part.map(writePlace).join(";"));
+  }
   if (state.walk) query.set("walk", state.walk.join(","));
   if (state.barriers.length > 0) query.set("barriers", writeRanges(state.barriers));
   if (state.method !== INITIAL.method) query.set("method", state.method);
@@ -31,6 +36,7 @@ export function writeState(state: State): string {
   if (state.effort !== INITIAL.effort) query.set("effort", String(state.effort));
   if (state.maxDistance !== null) query.set("max_distance", String(state.maxDistance));
   if (state.unit) query.set("unit", state.unit);
+  if (!state.distances) query.set("distances", "0");
   if (state.shade !== INITIAL.shade) query.set("shade", state.shade);
   if (writeLines(state.lines) !== writeLines(INITIAL.lines))
     query.set("lines", writeLines(state.lines));
@@ -41,22 +47,34 @@ export function writeState(state: State): string {
   if (state.up) query.set("up", state.up);
   if (state.view) query.set("view", state.view.map((x) => Number(x.toFixed(4))).join(","));
   // Points are easier to read without escapes, which none of these needs in a query.
-  const text = query.toString().replaceAll("%2C", ",").replaceAll("%3A", ":");
+  const text = query
+    .toString()
+    .replaceAll("%2C", ",")
+    .replaceAll("%3A", ":")
+    .replaceAll("%3B", ";");
   return text ? `?${text}` : ".";
+}
+
+/** Read which sample an address asks for in place of a mesh, and with how many faces. */
+export function readSample(search: string): [string, number] | null {
+  const [name, faces] = new URLSearchParams(search).get("sample")?.split(":") ?? [];
+  return name && faces ? [name, Number(faces)] : null;
 }
 
 const UPS: readonly Up[] = ["y", "z"];
 
 export function readState(search: string): WrittenState {
   const query = new URLSearchParams(search);
-  const target = query.get("target");
+  const [sources, via, targets] = ["source", "via", "target"].map((name) =>
+    query.getAll(name).flatMap((text) => text.split(";")),
+  ) as [string[], string[], string[]];
+  const others = [...via, ...targets.slice(0, 1)];
   const numbers = query.get("view")?.split(",").map(Number);
   const view = numbers?.length === 6 && numbers.every(Number.isFinite) ? numbers : null;
   return {
     mesh: query.get("mesh"),
-    sources: query.getAll("source").map(parsePoint),
-    target: target === null ? null : parsePoint(target),
-    waypoints: query.getAll("via").map(parsePoint),
+    places: [...sources, ...others].map(readPlace),
+    starts: Math.max(1, sources.length),
     walk: readWalk(query.get("walk") ?? ""),
     barriers: readRanges(query.get("barriers") ?? ""),
     method: oneOf<Method>(query.get("method"), ["exact", "approximate", "fast"]),
@@ -65,6 +83,7 @@ export function readState(search: string): WrittenState {
     maxDistance: positive(query.get("max_distance")),
     isReadable: true,
     unit: query.get("unit")?.slice(0, LONGEST_UNIT) ?? "",
+    distances: query.get("distances") !== "0",
     shade: oneOf<Shade>(query.get("shade"), ["distance", "territories", "difference", "proof"]),
     lines: readLines(query.get("lines")),
     polar: query.get("polar") === "1",
@@ -75,6 +94,16 @@ export function readState(search: string): WrittenState {
     up: UPS.find((up) => up === query.get("up")) ?? (view && "y"),
     view,
   };
+}
+
+/** Write a point, and behind it its name, which may hold any character but a semicolon. */
+function writePlace({ point, name }: Place): string {
+  return name ? `${writePoint(point)}*${name}` : writePoint(point);
+}
+
+function readPlace(text: string): Place<WrittenPoint> {
+  const [point = "", ...name] = text.split("*");
+  return { point: parsePoint(point), name: name.join("*").slice(0, LONGEST_NAME) };
 }
 
 function writeLines(lines: Lines): string {

@@ -1,6 +1,7 @@
-// Points as text: v12, e12-13:0.3, f7:0.2,0.3,0.5, p1,2,3.
+// Points as text: v12, e12-13:0.3, f7:0.2,0.3, p1,2,3; and lists of them: v12 > v5 > v99.
 import type { Point } from "../api/types";
 import { InputError } from "../inputError";
+import { type Places, startsOf } from "./places";
 
 export type WrittenPoint = Point | { position: [number, number, number] };
 
@@ -8,7 +9,7 @@ const NUMBER = String.raw`[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?`;
 const TRIPLE = `(${NUMBER}),(${NUMBER}),(${NUMBER})`;
 const VERTEX = /^v?(\d+)$/;
 const EDGE = new RegExp(`^e(\\d+)-(\\d+):(${NUMBER})$`);
-const FACE = new RegExp(`^f(\\d+):${TRIPLE}$`);
+const FACE = new RegExp(`^f(\\d+):(${NUMBER}),(${NUMBER})(?:,(${NUMBER}))?$`);
 const POSITION = new RegExp(`^p${TRIPLE}$`);
 
 export function parsePoint(text: string): WrittenPoint {
@@ -17,29 +18,46 @@ export function parsePoint(text: string): WrittenPoint {
   const edge = EDGE.exec(text);
   if (edge) return { edge: [Number(edge[1]), Number(edge[2])], t: Number(edge[3]) };
   const face = FACE.exec(text);
-  if (face) return { face: Number(face[1]), barycentric: triple(face, 2) };
+  if (face) return { face: Number(face[1]), barycentric: weights(face) };
   const position = POSITION.exec(text);
   if (position) return { position: triple(position, 1) };
   throw new InputError(
     "Not a point",
     `“${text}” is not a point.`,
-    "Write v12 for a vertex, e12-13:0.3 for a place on an edge, f7:0.2,0.3,0.5 for one in a face, " +
+    "Write v12 for a vertex, e12-13:0.3 for a place on an edge, f7:0.2,0.3 for one in a face, " +
       "or p1,2,3 for a position.",
   );
 }
 
-/** Read points, with blanks between them, and commas before the blanks if there are any. */
-export function parsePoints(text: string): WrittenPoint[] {
-  return text
-    .split(/,?\s+|,$/)
-    .filter(Boolean)
-    .map(parsePoint);
+/** Read the starts, and after each > a point that the path goes to; names stay with their points. */
+export function parsePlaces(text: string, before: Places): Places<WrittenPoint> {
+  const [first = [], ...others] = text.split(">").map((part) =>
+    part
+      .split(/,?\s+|,$/)
+      .filter(Boolean)
+      .map(parsePoint),
+  );
+  const names = new Map(before.places.map(({ point, name }) => [writePoint(point), name]));
+  const points = [...first, ...others.flat()];
+  return {
+    places: points.map((point) => ({
+      point,
+      name: ("position" in point ? "" : names.get(writePoint(point))) ?? "",
+    })),
+    starts: Math.max(1, first.length),
+  };
+}
+
+export function writePlaces(list: Places): string {
+  const others = list.places.slice(list.starts).map(({ point }) => writePoint(point));
+  return [startsOf(list).map(writePoint).join(" "), ...others].join(" > ");
 }
 
 export function writePoint(point: Point): string {
   if ("vertex" in point) return `v${point.vertex}`;
   if ("edge" in point) return `e${point.edge.join("-")}:${point.t}`;
-  return `f${point.face}:${point.barycentric.map((weight) => short(weight)).join(",")}`;
+  const [u, v] = point.barycentric;
+  return `f${point.face}:${[u, v].map((weight) => String(short(weight)).replace(/^0\./, ".")).join(",")}`;
 }
 
 /** Return a point in words, without its coordinates. */
@@ -49,19 +67,21 @@ export function sayPoint(point: Point): string {
   return `on face ${point.face}`;
 }
 
-/** Round the weights to six digits: less than a millionth of a face cannot be seen. */
+/** Round weights to four digits, and keep their sum: less than that of a face can hardly be seen. */
 export function rounded(point: Point): Point {
   if (!("face" in point)) return point;
-  const [u, v] = point.barycentric.map((weight) => Number(weight.toFixed(6))) as [
-    number,
-    number,
-    number,
-  ];
-  return { face: point.face, barycentric: [u, v, short(Math.max(0, 1 - u - v))] };
+  const [u, v] = point.barycentric.map((x) => short(x, 4)) as [number, number, number];
+  return { face: point.face, barycentric: [u, v, short(Math.max(0, 1 - u - v), 4)] };
 }
 
-function short(x: number): number {
-  return Number(x.toFixed(6));
+function short(x: number, digits = 6): number {
+  return Number(x.toFixed(digits));
+}
+
+/** Return the three weights, of which the third may not be written. */
+function weights(match: RegExpExecArray): [number, number, number] {
+  const [u, v] = [Number(match[2]), Number(match[3])];
+  return [u, v, match[4] === undefined ? Number((1 - u - v).toPrecision(12)) : Number(match[4])];
 }
 
 function triple(match: RegExpExecArray, from: number): [number, number, number] {

@@ -1,6 +1,7 @@
 // The state of the page: all that the user has chosen. Everything that is drawn follows from it.
-import type { Effort, Method, Point } from "../api/types";
+import type { Effort, Method } from "../api/types";
 import type { Triple, Up } from "../mesh/frame";
+import type { Place } from "./places";
 
 export type Shade = "distance" | "territories" | "difference" | "proof";
 export const PALETTES = ["teal", "viridis", "magma", "cividis", "turbo"] as const;
@@ -9,10 +10,11 @@ export type Lines = { count: number } | { spacing: number } | null;
 
 export interface State {
   mesh: string | null;
-  sources: Point[];
-  target: Point | null;
-  waypoints: Point[];
-  /** Direction and length of a straight line from the first source, in mesh units. */
+  /** The starts, then the stops of the path, then its end. */
+  places: readonly Place[];
+  /** How many of the places are starts; with one place more there is a path. */
+  starts: number;
+  /** Direction and length of a straight line from the first start, in mesh units. */
   walk: Triple | null;
   barriers: number[];
   method: Method;
@@ -23,6 +25,8 @@ export interface State {
   isReadable: boolean;
   /** The name of the unit of the mesh; empty: unknown. */
   unit: string;
+  /** Whether distances from the starts are computed and drawn. */
+  distances: boolean;
   shade: Shade;
   lines: Lines;
   /** Whether rays of the log map cross the isolines. */
@@ -39,9 +43,8 @@ export interface State {
 
 export const INITIAL: State = {
   mesh: null,
-  sources: [],
-  target: null,
-  waypoints: [],
+  places: [],
+  starts: 1,
   walk: null,
   barriers: [],
   method: "exact",
@@ -50,6 +53,7 @@ export const INITIAL: State = {
   maxDistance: null,
   isReadable: true,
   unit: "",
+  distances: true,
   shade: "distance",
   lines: { count: 20 },
   polar: false,
@@ -60,32 +64,91 @@ export const INITIAL: State = {
   view: null,
 };
 
-/** A change to any of these is another question: it can be read, unless the change says otherwise. */
-const QUESTION = [
-  "mesh",
-  "sources",
-  "target",
-  "waypoints",
-  "walk",
-  "barriers",
-  "maxDistance",
-] as const;
+/** What makes the question; a change to it can be read, unless the change says otherwise. */
+export const NO_QUESTION = {
+  places: [],
+  starts: 1,
+  walk: null,
+  barriers: [],
+  maxDistance: null,
+} satisfies Partial<State>;
 
 type Listener = (state: State, before: State) => void;
 
 export class Store {
   private current = INITIAL;
   private readonly listeners: Listener[] = [];
+  private readonly past: State[] = [];
+  private readonly future: State[] = [];
+  /** A gesture changes the state many times, and is undone at once. */
+  private gesture: "none" | "begun" | "under way" = "none";
 
   get state(): State {
     return this.current;
   }
 
+  get canUndo(): boolean {
+    return this.past.length > 0;
+  }
+
+  get canRedo(): boolean {
+    return this.future.length > 0;
+  }
+
+  /** Change the state by a step that can be undone. */
   update(change: Partial<State>): void {
     const before = this.current;
-    const asks = QUESTION.some((name) => name in change);
+    const names = Object.keys(change) as (keyof State)[];
+    if (this.gesture !== "under way" && names.some((name) => change[name] !== before[name])) {
+      this.past.push(before);
+      this.future.length = 0;
+      if (this.gesture === "begun") this.gesture = "under way";
+    }
+    this.replace(change);
+  }
+
+  /** Change the state by what is no step of the user's, or follows from one. */
+  replace(change: Partial<State>): void {
+    const before = this.current;
+    const asks = ["mesh", ...Object.keys(NO_QUESTION)].some((name) => name in change);
     this.current = { ...before, isReadable: before.isReadable || asks, ...change };
     for (const listener of this.listeners) listener(this.current, before);
+  }
+
+  beginGesture(): void {
+    this.gesture = "begun";
+  }
+
+  endGesture(): void {
+    this.gesture = "none";
+  }
+
+  /** End the gesture, and undo what it changed. */
+  abandonGesture(): void {
+    if (this.gesture === "under way") {
+      this.undo();
+      this.future.length = 0;
+    }
+    this.gesture = "none";
+  }
+
+  undo(): void {
+    this.restore(this.past, this.future);
+  }
+
+  redo(): void {
+    this.restore(this.future, this.past);
+  }
+
+  private restore(from: State[], to: State[]): void {
+    const state = from.pop();
+    if (!state) return;
+    const { mesh, up, view } = this.current;
+    to.push(this.current);
+    // The camera stays where it is, if that is a view of what is shown then.
+    const isSame = state.mesh === mesh && (state.up ?? up) === up;
+    const seen = isSame ? { view, up } : {};
+    this.replace({ ...state, isReadable: true, ...seen });
   }
 
   listen(listener: Listener): void {
@@ -97,12 +160,7 @@ export class Store {
 export function withMesh(mesh: string, { lines }: State): Partial<State> {
   return {
     mesh,
-    sources: [],
-    target: null,
-    waypoints: [],
-    walk: null,
-    barriers: [],
-    maxDistance: null,
+    ...NO_QUESTION,
     unit: "",
     range: null,
     lines: lines && "spacing" in lines ? INITIAL.lines : lines,

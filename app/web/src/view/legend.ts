@@ -47,7 +47,7 @@ export function showScale(title: string, largest: number): void {
 /** Show the colour of each source's territory. */
 export function showTerritories(sources: string[]): void {
   byId("legend").hidden = false;
-  byId("legend-title").textContent = "Nearest source";
+  byId("legend-title").textContent = "Nearest start";
   byId("scale").hidden = true;
   byId("territories").replaceChildren(
     ...sources.map((name, i) => {

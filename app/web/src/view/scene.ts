@@ -16,10 +16,11 @@ import { Backdrop } from "./backdrop";
 
 ColorManagement.enabled = false; // colours are given in sRGB, as displayed
 
+/** The angle of what the camera sees, in degrees. */
+const FIELD = 38;
 /** How far the camera stays away beyond what the mesh needs. */
 const MARGIN = 1.12;
-/** Directions to look from; what is flat is seen from higher up. */
-const ASIDE = new Vector3(0.5, 0.35, 0.8);
+/** The direction to look from at what is flat: from higher up. */
 const ABOVE = new Vector3(0.4, 0.9, 0.8);
 /** Below this half height, in radii of the unit ball, a mesh is flat. */
 const FLAT = 0.3;
@@ -32,11 +33,15 @@ export class Stage {
   /** Objects that move while the mesh stands still; drawn over it. */
   private readonly overlay = new Scene();
   private readonly backdrop: Backdrop;
-  readonly camera = new PerspectiveCamera(38, 1, 0.01, 50);
+  readonly camera = new PerspectiveCamera(FIELD, 1, 0.01, 50);
   private readonly controls: OrbitControls;
   readonly renderer: WebGLRenderer;
   /** Drawn positions of the mesh, three numbers each, which a view of the whole mesh shows. */
   shape: ArrayLike<number> = [];
+  /** The direction from which it is seen first. */
+  front = new Vector3(0, 0, 1);
+  /** The direction from which the whole mesh is seen, as long as nobody moves it. */
+  private whole: Vector3 | null = null;
   onMove: (view: number[]) => void = () => undefined;
   onFrame: () => void = () => undefined;
   private isDue = false;
@@ -57,12 +62,11 @@ export class Stage {
     let before: number[] | null = null;
     this.controls.addEventListener("start", () => (before ??= this.view)); // each finger starts
     this.controls.addEventListener("end", () => {
-      if (before && this.view.some((x, i) => Math.abs(x - before![i]!) > 1e-4))
-        this.onMove(this.view);
+      if (before && this.view.some((x, i) => Math.abs(x - before![i]!) > 1e-4)) this.moved();
       before = null;
     });
     this.camera.layers.enable(LINES);
-    this.look(null);
+    this.lookAtAll();
     new ResizeObserver(() => this.resize()).observe(canvas);
     this.resize();
   }
@@ -136,9 +140,21 @@ export class Stage {
     return [away.theta, away.phi, away.radius, target.x, target.y, target.z];
   }
 
-  /** Move the camera to a view; null shows the whole mesh. */
-  look(view: number[] | null): void {
-    const [theta, phi, radius, x, y, z] = view ?? this.viewFrom(this.isFlat() ? ABOVE : ASIDE);
+  private moved(): void {
+    this.whole = null;
+    this.onMove(this.view);
+  }
+
+  /** Show the whole mesh from a direction, whatever size the canvas gets. */
+  lookAtAll(direction = this.isFlat() ? ABOVE : this.front): void {
+    this.look(this.viewFrom(direction));
+    this.whole = direction;
+  }
+
+  /** Move the camera to a view. */
+  look(view: number[]): void {
+    this.whole = null;
+    const [theta, phi, radius, x, y, z] = view;
     this.controls.target.set(x!, y!, z!);
     this.camera.position
       .setFromSpherical(new Spherical(radius, phi, theta))
@@ -149,7 +165,7 @@ export class Stage {
   }
 
   /** Return the view of the whole mesh from a direction, kept off the poles, where up is undefined. */
-  viewFrom(direction: Vector3): number[] {
+  private viewFrom(direction: Vector3): number[] {
     const { theta, phi } = new Spherical().setFromVector3(direction);
     const tilt = Math.min(Math.max(phi, 0.4), Math.PI - 0.4);
     return [theta, tilt, MARGIN * this.distanceFrom(theta, tilt), 0, 0, 0];
@@ -184,7 +200,7 @@ export class Stage {
     const [theta, phi, radius, ...target] = this.view as [number, number, number, ...number[]];
     const tilt = Math.min(Math.max(phi + polar, 0.02), Math.PI - 0.02);
     this.look([theta + azimuth, tilt, radius / nearer, ...target]);
-    this.onMove(this.view);
+    this.moved();
   }
 
   /** Return the place of a pointer on the canvas (-1 to 1, y upwards). */
@@ -213,7 +229,11 @@ export class Stage {
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
+    // A narrow canvas shows as much from side to side as a wide one from top to bottom.
+    const slope = Math.tan((FIELD * Math.PI) / 360) / Math.min(this.camera.aspect, 1);
+    this.camera.fov = (Math.atan(slope) * 360) / Math.PI;
     this.camera.updateProjectionMatrix();
+    if (this.whole) this.lookAtAll(this.whole);
     this.invalidate();
   }
 

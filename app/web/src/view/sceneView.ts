@@ -1,14 +1,16 @@
 // The mesh on the stage, with points, path, barriers and faults on it.
 import { Mesh, PlaneGeometry, Vector3 } from "three";
 import type { MeshBVH } from "three-mesh-bvh";
-import type { Border, Line, MeshDocument, Outline, Point } from "../api/types";
-import type { Up } from "../mesh/frame";
+import type { Border, Line, MeshDocument, Outline } from "../api/types";
+import { frontOf, type Up } from "../mesh/frame";
 import { type LoadedMesh, loadMesh } from "../mesh/loader";
-import { type FacePoint, pick, positionOf } from "../mesh/picking";
+import { type FacePoint, isSeen, pick, positionOf } from "../mesh/picking";
+import { nameOf } from "../state/places";
 import type { State } from "../state/state";
 import { type Rgb, territory } from "./colours";
 import { IsolineLayer } from "./isolines";
-import { type Mark, Markers } from "./markers";
+import { Labels } from "./labels";
+import { Markers } from "./markers";
 import { Patch } from "./patch";
 import { RouteLine } from "./route";
 import { showScaleBar } from "./scalebar";
@@ -17,9 +19,9 @@ import type { Triple } from "./simplified";
 import { Surface, surfacePaint } from "./surface";
 import { Territories } from "./territories";
 
-const SOURCE: Rgb = [0.09, 0.13, 0.24];
-const TARGET: Rgb = [0.9, 0, 0.36];
-const WAYPOINT: Rgb = [0.96, 0.62, 0.04];
+const START: Rgb = [0.09, 0.13, 0.24];
+const END: Rgb = [0.9, 0, 0.36];
+const STOP: Rgb = [0.96, 0.62, 0.04];
 const FAULT: Rgb = [0.85, 0.1, 0.1];
 const WALK: Rgb = [0.15, 0.39, 0.92];
 const ROUTE_LINE = 0xe6005c;
@@ -41,6 +43,7 @@ export class SceneView {
   private readonly walk: RouteLine;
   private readonly walkEnd: Markers;
   private readonly territories: Territories;
+  private readonly labels: Labels;
 
   constructor(readonly stage: Stage) {
     this.barriers = new Patch(stage, 0x15181f, 0.82);
@@ -55,7 +58,11 @@ export class SceneView {
     this.points = new Markers(stage);
     this.faultPoints = new Markers(stage);
     this.warmUp();
-    stage.onFrame = () => showScaleBar(stage, this.mesh?.frame.radius ?? null);
+    this.labels = new Labels(stage, (position) => this.isSeen(position));
+    stage.onFrame = () => {
+      showScaleBar(stage, this.mesh?.frame.radius ?? null);
+      this.labels.follow();
+    };
   }
 
   async open(document: MeshDocument, up: Up | null, signal: AbortSignal): Promise<void> {
@@ -63,7 +70,10 @@ export class SceneView {
     this.close();
     this.mesh = mesh;
     this.surface = new Surface(mesh, this.paint);
-    this.stage.shape = mesh.geometry.getAttribute("position").array;
+    const { array: positions } = mesh.geometry.getAttribute("position");
+    const { array: normals } = mesh.geometry.getAttribute("normal");
+    this.stage.shape = positions;
+    this.stage.front.set(...frontOf(positions, normals));
     this.stage.add(this.surface.object);
     await this.stage.drawn();
     this.tree = await mesh.tree;
@@ -75,7 +85,7 @@ export class SceneView {
       [0, 0, 0],
       [0, 0, 0],
     ];
-    this.points.show([{ position: [0, 0, 0], fill: SOURCE, size: 0 }]);
+    this.points.show([{ position: [0, 0, 0], fill: START, size: 0 }]);
     this.isolines.show({ drawn: () => [0, 0, 0] }, [{ points: nowhere, closed: false }]);
     this.route.show(nowhere);
     this.stage.warmUp(new Mesh(new PlaneGeometry(0, 0), this.paint));
@@ -92,6 +102,7 @@ export class SceneView {
     this.mesh = this.surface = this.tree = null;
     for (const patch of [this.barriers, this.region, this.faults]) patch.show(null, []);
     this.points.show([]);
+    this.labels.show([]);
     this.faultPoints.show([]);
     this.isolines.show(null, []);
     this.rays.show(null, []);
@@ -109,11 +120,19 @@ export class SceneView {
     return this.mesh && this.tree ? pick(this.mesh, this.tree, this.stage.camera, x, y) : null;
   }
 
-  /** Return a view in which the points can be seen; null where there are none. */
-  viewOf({ sources, target }: State): number[] | null {
+  /** Whether a drawn position of the surface is not hidden by it. */
+  isSeen(position: Triple): boolean {
+    return !this.tree || isSeen(this.tree, this.stage.camera, position);
+  }
+
+  /** Show the whole mesh, from where the points can be seen if there are any. */
+  lookAtAll({ places }: State): void {
     const mesh = this.mesh;
-    const points = (target ? [...sources, target] : sources).filter((point) => mesh?.has(point));
-    if (!mesh || points.length === 0) return null;
+    const points = places.map(({ point }) => point).filter((point) => mesh?.has(point));
+    if (!mesh || points.length === 0) {
+      this.stage.lookAtAll();
+      return;
+    }
     const normals = mesh.geometry.getAttribute("normal");
     const direction = new Vector3();
     for (const point of points) {
@@ -125,18 +144,23 @@ export class SceneView {
             : mesh.corners(point.face)[0];
       direction.add(new Vector3().fromBufferAttribute(normals, corner));
     }
-    return this.stage.viewFrom(direction);
+    this.stage.lookAtAll(direction);
   }
 
   /** Show the points of the question: those that the mesh has. */
-  showPoints({ sources, target, waypoints, shade, isReadable }: State): void {
-    const fill = (i: number): Rgb => (shade === "territories" ? territory(i) : SOURCE);
-    const marks = [
-      ...sources.flatMap((source, i) => this.mark(source, fill(i), 17)),
-      ...waypoints.flatMap((waypoint) => this.mark(waypoint, WAYPOINT, 14)),
-      ...(target ? this.mark(target, TARGET, 17) : []),
-    ];
-    this.points.show(isReadable ? marks : []);
+  showPoints(state: State): void {
+    const { mesh } = this;
+    const { places, starts, distances, shade, isReadable } = state;
+    const hasTerritories = distances && shade === "territories";
+    const shown = places.flatMap(({ point }, i) => {
+      if (!mesh?.has(point) || !isReadable) return [];
+      const isStop = i >= starts && i < places.length - 1;
+      const fill = i < starts ? (hasTerritories ? territory(i) : START) : isStop ? STOP : END;
+      const position = mesh.drawn(positionOf(mesh, point));
+      return { position, fill, size: isStop ? 14 : 17, name: nameOf(state, i) };
+    });
+    this.points.show(shown);
+    this.labels.show(shown);
   }
 
   showBarriers({ barriers, isReadable }: State): void {
@@ -179,10 +203,5 @@ export class SceneView {
       size: 13,
     }));
     this.faultPoints.show(marks);
-  }
-
-  private mark(point: Point, fill: Rgb, size: number): Mark[] {
-    const { mesh } = this;
-    return mesh?.has(point) ? [{ position: mesh.drawn(positionOf(mesh, point)), fill, size }] : [];
   }
 }

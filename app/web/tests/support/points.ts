@@ -1,7 +1,13 @@
 // Random points of a surface, as the page writes them.
 import type { Point } from "../../src/api/types";
+import type { Place } from "../../src/state/places";
 import { rounded } from "../../src/state/point";
 import type { Random } from "./random";
+
+/** Return places without names at points. */
+export function placesAt(...points: Point[]): Place[] {
+  return points.map((point) => ({ point, name: "" }));
+}
 
 export function randomPoint(random: Random): Point {
   const kind = random.pick(["vertex", "edge", "face"] as const);
