@@ -82,8 +82,7 @@ def test_no_fault_of_access(view: View, service: str, theme: str) -> None:
 def test_another_question_ends_it(view: View, service: str) -> None:
     show(view, sample(service, "terrain", 200), 40)
     assert not view.page.is_visible("#legend")
-    view.page.fill("#sources", "v3")
-    view.page.press("#sources", "Enter")
+    view.ask("v3")
     view.wait()
     assert not view.page.is_visible("#player")
     assert view.page.is_visible("#legend")
