@@ -94,6 +94,21 @@ def test_another_question_ends_it(view: View, service: str) -> None:
     assert not sees_front(view)
 
 
+def test_it_lies_below_the_mesh_on_a_phone(view: View, service: str) -> None:
+    view.page.set_viewport_size({"width": 360, "height": 640})
+    view.open(f"/?mesh={sample(service, 'terrain', 200)}&source=v0")
+    view.page.click("#fold")
+    view.page.click("#film > summary")
+    view.page.click("#film-start")
+    view.page.locator("#player").wait_for()
+    view.wait()
+    boxes = [view.page.locator(each).bounding_box() for each in ("#canvas", "#player", "#panel")]
+    canvas, player, panel = (box for box in boxes if box is not None)
+    assert canvas["y"] + canvas["height"] <= player["y"] + 1
+    assert player["y"] + player["height"] <= panel["y"] + 1
+    assert canvas["height"] > 200
+
+
 def test_large_meshes_are_told_the_limit(view: View, sphere: str) -> None:
     view.open(f"/?mesh={sphere}&source=v0")
     view.page.click("#film > summary")
