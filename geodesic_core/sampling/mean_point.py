@@ -8,7 +8,6 @@ import numpy as np
 
 from geodesic_core.arrays import Floats
 from geodesic_core.control import Control
-from geodesic_core.errors import NoTangentPlane
 from geodesic_core.fields.charts import Charts, charts_of
 from geodesic_core.fields.question import Question
 from geodesic_core.fields.sources import component_of, disconnected
@@ -41,8 +40,7 @@ class MeanPoint:
     variance: float
     """Mesh units squared: the weighted mean of the squared distances from the points."""
     converged: bool
-    """Whether no point near it is better. False if the search was still moving when it ended, or
-    could not move, as the best vertex has no tangent plane."""
+    """Whether no point near it is better. False if the search was still moving when it ended."""
     moves: int
     """How often the search moved, from the best vertex on."""
 
@@ -69,11 +67,8 @@ def find_mean(
             message = f"{points[0]} and {point} are in different connected components"
             raise disconnected(mesh, message, points[0], point)
     silent = replace(control, progress=None)
-    start, variance = _best_vertex(mesh, points, weights, control.for_part(0, 2))
-    try:
-        mean = _charts(mesh, start, points, silent)
-    except NoTangentPlane:
-        return MeanPoint(start, variance, converged=False, moves=0)
+    start = _best_vertex(mesh, points, weights, control.for_part(0, 2))
+    mean = _charts(mesh, start, points, silent)
     smallest = SMALLEST_MOVE * mesh.extent
     moves, converged = 0, False
     while not converged and moves < _MOST_MOVES:
@@ -92,15 +87,15 @@ def find_mean(
 
 def _best_vertex(
     mesh: TriangleMesh, points: Sequence[SurfacePoint], weights: Floats, control: Control
-) -> tuple[SurfacePoint, float]:
-    """Return the vertex of least variance, and that. One sweep for each point."""
+) -> SurfacePoint:
+    """Return the vertex of least variance. One sweep for each point."""
     costs, inner = np.zeros(len(mesh.vertices)), mesh.topology.inner_vertex
     for i, point in enumerate(points):
         if weights[i] > 0.0:
             part = control.for_part(i, len(points))
             sweep = ExactSweep(Question.of(mesh, point, (), math.inf, part))
             costs += weights[i] * sweep.run(part).vertices.distance[inner] ** 2
-    return mesh.point(int(costs.argmin())), float(costs.min())
+    return mesh.point(int(costs.argmin()))
 
 
 def _lower(
