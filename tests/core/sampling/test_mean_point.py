@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.errors import Cancelled, InvalidArgument, NoPath
+from geodesic_core.errors import Cancelled, InvalidArgument, NoPath, NoTangentPlane
 from tests.support import zoo
 from tests.support.meshes import mesh_of, random_points
 
@@ -85,8 +85,12 @@ def test_it_is_no_worse_than_any_vertex(case):
     mesh = mesh_of(case)
     component = np.flatnonzero(mesh.components == mesh.components[mesh.faces[0, 0]])
     points = [int(component[i]) for i in (0, len(component) // 2, -1)]
-    mean = gc.mean_point(mesh, points)
     fields = np.square([gc.exact_distance(mesh, point).distances for point in points])
+    if case.name.startswith("bow_tie"):  # the best vertex is where the fans meet
+        with pytest.raises(NoTangentPlane, match="several fans"):
+            gc.mean_point(mesh, points)
+        return
+    mean = gc.mean_point(mesh, points)
     assert mean.variance <= fields.mean(axis=0).min() * (1.0 + 1e-12)
 
 
