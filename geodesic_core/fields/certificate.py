@@ -152,8 +152,6 @@ def certified(sweep: Sweep, result: SweepResult, control: Control) -> Certificat
     if question.has_curves:
         raise InvalidArgument("a field with curves as sources has no certificate yet: give points")
     winners, windows = result.winners, result.windows
-    if whole is not sweep:
-        windows = None
     mesh, limit = question.mesh, question.max_distance
     if winners is None or windows is None or math.isfinite(limit):
         # Faces at the limit must have all windows.
