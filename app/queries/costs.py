@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 import geodesic_core as gc
 from app.errors import pointer
+from app.queries.accuracy import solve_field
 from app.queries.base import ExecutionContext
 from app.queries.validation import invalid_fields, naming
-from app.schemas.requests import Accuracy, SurfaceCost
+from app.schemas.requests import Accuracy, DistancesRequest, PathsRequest, SurfaceCost
 from app.store.meshes import OpenMesh
 
 ROUGHLY = gc.ErrorBound("relative", 0.05, "estimated")
@@ -35,8 +36,10 @@ def check_alone(request: Accuracy, *others: str) -> None:
         raise invalid_fields(list(map(pointer, wrong)), "does not go with cost")
 
 
-def sweeps_of(cost: SurfaceCost) -> float:
-    """Return the exact sweeps that take as long as one with a cost, about."""
+def sweeps_of(cost: SurfaceCost | None) -> float:
+    """Return the exact sweeps that take as long as one with a cost, about; 1 without one."""
+    if cost is None:
+        return 1.0
     return SWEEPS[cost.detail] * (1.0 if cost.slope is None else 2.0)
 
 
@@ -91,6 +94,20 @@ class CostsAsDistances:
     def path_to(self, point: gc.SurfacePoint) -> gc.CheapestPath:
         """Return the cheapest path."""
         return self.field.path_to(point)
+
+
+def solve_either(
+    opened: OpenMesh,
+    request: DistancesRequest | PathsRequest,
+    sources: Sequence[gc.Source],
+    context: ExecutionContext,
+    targets: Sequence[gc.SurfacePoint],
+) -> gc.DistanceField | CostsAsDistances:
+    """Return the distances from some sources, or the costs if the request has any."""
+    if request.cost is not None:
+        return solve_costs(opened, request.cost, sources, context)
+    limit = request.max_distance
+    return solve_field(opened, request, sources, context, max_distance=limit, targets=targets)
 
 
 def solve_costs(

@@ -13,13 +13,12 @@ from app.encoding import CSV, JSON, NPY, NPZ, OCTETS, PLY, Answer, Indices
 from app.errors import Fault, problem
 from app.queries.accuracy import (
     bound_of,
-    solve_field,
     stats_of,
     with_default_accuracy,
 )
 from app.queries.base import VALUES_OF_POINT, ExecutionContext
 from app.queries.cost_model import PER_FACE_CERTIFIED, PER_POINT, sweep_seconds
-from app.queries.costs import CHEAPEST, CostsAsDistances, check_alone, solve_costs, sweeps_of
+from app.queries.costs import CHEAPEST, check_alone, solve_either, sweeps_of
 from app.queries.from_sources import FromSources
 from app.queries.points import (
     SurfacePoints,
@@ -102,8 +101,7 @@ class DistancesQuery(FromSources[DistancesRequest]):
         request = self.request
         points = self.source_count + len(request.targets or ())
         proof = PER_FACE_CERTIFIED * self.size.faces if request.certify else 0.0
-        sweeps = 1.0 if request.cost is None else sweeps_of(request.cost)
-        seconds = sweeps * sweep_seconds(self.size.faces, request, self.share)
+        seconds = sweeps_of(request.cost) * sweep_seconds(self.size.faces, request, self.share)
         return seconds + PER_POINT * points + proof
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
@@ -117,19 +115,8 @@ class DistancesQuery(FromSources[DistancesRequest]):
         if request.certify:
             _check_vertices(targets or ())
         starts = to_sources(mesh, request.sources, sources)
-        limit, parts = request.max_distance, 2 if request.certify else 1
-        field: gc.DistanceField | CostsAsDistances
-        if request.cost is not None:
-            field = solve_costs(opened, request.cost, starts, context)
-        else:
-            field = solve_field(
-                opened,
-                request,
-                starts,
-                context.part(0, parts),
-                max_distance=limit,
-                targets=targets or (),
-            )
+        parts = 2 if request.certify else 1
+        field = solve_either(opened, request, starts, context.part(0, parts), targets or ())
         certificate = None
         if isinstance(field, gc.DistanceField) and request.certify:
             field = copy(field)  # that of the cache keeps its bound, as others are answered by it

@@ -7,13 +7,12 @@ import geodesic_core as gc
 from app.encoding import Answer
 from app.queries.accuracy import (
     affinity_keys_of,
-    solve_field,
     stats_of,
     with_default_accuracy,
 )
 from app.queries.base import VALUES_OF_POINT, ExecutionContext, Query
 from app.queries.cost_model import PER_PATH, PER_POINT, share_reached, sweep_seconds
-from app.queries.costs import CHEAPEST, CostsAsDistances, check_alone, solve_costs, sweeps_of
+from app.queries.costs import CHEAPEST, check_alone, solve_either, sweeps_of
 from app.queries.lines import OFFERS
 from app.queries.outline import no_outline, outline_of
 from app.queries.points import (
@@ -70,8 +69,7 @@ class PathsQuery(Query[PathsRequest]):
         """Return the cost of a sweep to the limit, and of the paths."""
         request = self.request
         share = share_reached(self.size, point_count(request.source), request.max_distance)
-        sweeps = 1.0 if request.cost is None else sweeps_of(request.cost)
-        sweep = sweeps * sweep_seconds(self.size.faces, request, share)
+        sweep = sweeps_of(request.cost) * sweep_seconds(self.size.faces, request, share)
         return sweep + (PER_PATH + PER_POINT) * len(request.targets)
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
@@ -80,7 +78,7 @@ class PathsQuery(Query[PathsRequest]):
         count = point_count(request.source)
         starts, targets = points[:count], points[count:]
         start = to_point_or_curve(opened.mesh, "/source", request.source, starts)
-        field = self._field(opened, gc.Source(start), targets, context)
+        field = solve_either(opened, request, [gc.Source(start)], context, targets)
         found: list[dict[str, Any]] = []
         values = 0
         for target in targets:
@@ -109,23 +107,4 @@ class PathsQuery(Query[PathsRequest]):
             members,
             shown=("paths",),
             lines=lambda: [line_of(path, i) for i, path in enumerate(found)],
-        )
-
-    def _field(
-        self,
-        opened: OpenMesh,
-        source: gc.Source,
-        targets: SurfacePoints,
-        context: ExecutionContext,
-    ) -> gc.DistanceField | CostsAsDistances:
-        request = self.request
-        if request.cost is not None:
-            return solve_costs(opened, request.cost, [source], context)
-        return solve_field(
-            opened,
-            request,
-            [source],
-            context,
-            max_distance=request.max_distance,
-            targets=targets,
         )
