@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 import geodesic_core as gc
 from app.errors import pointer
-from app.queries.accuracy import solve_field
 from app.queries.base import ExecutionContext
 from app.queries.validation import invalid_fields, naming
-from app.schemas.requests import Accuracy, DistancesRequest, PathsRequest, SurfaceCost
+from app.schemas.requests import Accuracy, SurfaceCost
 from app.store.meshes import OpenMesh
 
 ROUGHLY = gc.ErrorBound("relative", 0.05, "estimated")
@@ -94,20 +93,6 @@ class CostsAsDistances:
     def path_to(self, point: gc.SurfacePoint) -> gc.CheapestPath:
         """Return the cheapest path."""
         return self.field.path_to(point)
-
-
-def solve_either(
-    opened: OpenMesh,
-    request: DistancesRequest | PathsRequest,
-    sources: Sequence[gc.Source],
-    context: ExecutionContext,
-    targets: Sequence[gc.SurfacePoint],
-) -> gc.DistanceField | CostsAsDistances:
-    """Return the distances from some sources, or the costs if the request has any."""
-    if request.cost is not None:
-        return solve_costs(opened, request.cost, sources, context)
-    limit = request.max_distance
-    return solve_field(opened, request, sources, context, max_distance=limit, targets=targets)
 
 
 def solve_costs(

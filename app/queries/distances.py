@@ -18,8 +18,8 @@ from app.queries.accuracy import (
 )
 from app.queries.base import VALUES_OF_POINT, ExecutionContext
 from app.queries.cost_model import PER_FACE_CERTIFIED, PER_POINT, sweep_seconds
-from app.queries.costs import CHEAPEST, check_alone, solve_either, sweeps_of
-from app.queries.from_sources import FromSources
+from app.queries.costs import CHEAPEST, check_alone, sweeps_of
+from app.queries.from_sources import FromSources, solve_either
 from app.queries.points import (
     SurfacePoints,
     components_of,

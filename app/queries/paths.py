@@ -12,7 +12,8 @@ from app.queries.accuracy import (
 )
 from app.queries.base import VALUES_OF_POINT, ExecutionContext, Query
 from app.queries.cost_model import PER_PATH, PER_POINT, share_reached, sweep_seconds
-from app.queries.costs import CHEAPEST, check_alone, solve_either, sweeps_of
+from app.queries.costs import CHEAPEST, check_alone, sweeps_of
+from app.queries.from_sources import solve_either
 from app.queries.lines import OFFERS
 from app.queries.outline import no_outline, outline_of
 from app.queries.points import (
