@@ -14,15 +14,22 @@ PLACES = (_APP / "site", _APP.parent / "docs" / "_build")
 
 
 def docs(
+    chapter: Annotated[
+        str, typer.Argument(help="As in index, howto/cortex, or operations#settings.")
+    ] = "index",
     path: Annotated[
-        bool, typer.Option("--path", help="Print where they are, and open nothing.")
+        bool, typer.Option("--path", help="Print where it is, and open nothing.")
     ] = False,
 ) -> None:
     """Open the documents in a browser; they need no network."""
-    indices = (place / "index.html" for place in PLACES)
-    index = next(filter(Path.is_file, indices), None)
-    if index is None:
-        raise Failure("this installation has no documents; in a checkout, scripts/docs builds them")
-    typer.echo(index)
-    if not path and not webbrowser.open(index.as_uri()):
-        raise Failure("no browser can be opened here; open the file above in one")
+    folder = next((place for place in PLACES if (place / "index.html").is_file()), None)
+    if folder is None:
+        raise Failure("this installation has no documents; scripts/docs in a checkout builds them")
+    page, _, heading = chapter.partition("#")
+    file = folder / f"{page}.html"
+    if not file.is_file():
+        raise Failure(f"there is no chapter {page}; index lists all")
+    address = file.as_uri() + (f"#{heading}" if heading else "")
+    typer.echo(file if path else address)
+    if not path and not webbrowser.open(address):
+        raise Failure("no browser can be opened here; open this address in one")
