@@ -45,7 +45,7 @@ def _table(fence: re.Match[str]) -> str:
     shown = [options["columns"], ["---"] * len(places)]
     shown += [[_without_target(row[place]) for place in places] for row in found]
     table = "\n".join(f"| {' | '.join(row)} |" for row in shown)
-    return f"{table}\n\nMeasured on {machine}."
+    return f"{table}\n\nMeasured: {machine}."
 
 
 def _without_target(cell: str) -> str:
