@@ -2878,6 +2878,11 @@ export interface components {
             title: string;
             /** Meaning */
             meaning: string;
+            /**
+             * Chapter
+             * @description Chapter of the documents that tells more: `geodesic docs CHAPTER` opens it
+             */
+            chapter: string;
         };
         /**
          * ProblemDocument
