@@ -1,7 +1,5 @@
 // The page's parts and their wiring: users change the state, and every part follows it.
-import { getMesh, makeSample } from "./api/meshes";
-import { getAbout } from "./api/queries";
-import type { About, MeshDocument } from "./api/types";
+import type { About, MeshDocument } from "geodesic-client";
 import { Borders } from "./ask/borders";
 import { Fields } from "./ask/fields";
 import { Isolines } from "./ask/isolines";
@@ -19,6 +17,7 @@ import { Notes } from "./panel/notes";
 import { PlaceList } from "./panel/placeList";
 import { Pointer } from "./panel/pointer";
 import { showReport } from "./panel/report";
+import { service } from "./service";
 import { readSample, readState, writeState } from "./state/permalink";
 import { type State, Store, unitOf, withMesh } from "./state/state";
 import { Status } from "./status";
@@ -135,7 +134,7 @@ function open(mesh: string): void {
   const stop = new AbortController();
   opening = stop;
   status.run("loading", "Loading the mesh…", stop, async () => {
-    const document = await getMesh(mesh);
+    const document = await service.mesh(mesh, { signal: stop.signal });
     await sceneView.open(document, store.state.up, stop.signal);
     stop.signal.throwIfAborted();
     controls.showUp(sceneView.mesh?.frame.up ?? "y");
@@ -177,7 +176,7 @@ function setAddress(): void {
 /** Read the address, and show what it asks for. */
 function begin(): void {
   status.run("loading", "Loading…", new AbortController(), async () => {
-    const about = await getAbout();
+    const about = await service.about();
     meshes.offer(about);
     exportPanel.offer(about);
     void meshes.list().catch((error: unknown) => status.fail(error));
@@ -221,7 +220,7 @@ async function showExample(): Promise<void> {
 
 /** Make a sample that the list of meshes has, and return its id. */
 async function makeListed(name: string, faces: number): Promise<string> {
-  const { id } = await makeSample(name, faces);
+  const { id } = await service.sample(name, faces);
   await meshes.list();
   return id;
 }

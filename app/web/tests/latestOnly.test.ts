@@ -1,5 +1,5 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import { LatestOnly } from "../src/api/latestOnly";
+import { LatestOnly } from "../src/ask/latestOnly";
 import { Random } from "./support/random";
 
 beforeEach(() => void vi.useFakeTimers());

@@ -1,17 +1,36 @@
 // Distances to all vertices: requested when sources, method or limits change, then painted.
-import type { Field, Proof, Question } from "../api/queries";
-import { askDistances, askProof, askTerritories } from "../api/queries";
-import type { Certificate, Effort, ErrorBound, Method } from "../api/types";
+import type {
+  Call,
+  Certificate,
+  Distances,
+  Effort,
+  ErrorBound,
+  Method,
+  Question,
+} from "geodesic-client";
 import { byId, count, duration, written } from "../dom";
 import type { LoadedMesh } from "../mesh/loader";
 import type { FacePoint } from "../mesh/picking";
 import type { Notes } from "../panel/notes";
+import { service } from "../service";
 import { nameOf, startsOf } from "../state/places";
 import { type State, unitOf } from "../state/state";
 import { PATIENCE_MS, type Status } from "../status";
 import { hideLegend, showHere, showProof, showScale, showTerritories } from "../view/legend";
 import type { SceneView } from "../view/sceneView";
 import type { Surface } from "../view/surface";
+
+/** Distances to all vertices, infinite where unreachable. */
+export interface Field extends Distances {
+  largest: number;
+}
+
+/** What proves the distances of a field. */
+interface Proof {
+  certificate: Certificate;
+  /** By how much each face widens the gap at most, in mesh units. */
+  violations: Float64Array;
+}
 
 /** Answers for one set of sources, barriers and limit. */
 interface Answers {
@@ -97,21 +116,23 @@ export class Fields {
     signal: AbortSignal,
   ): Promise<void> {
     const { answers } = this;
+    const call = { onProgress, signal };
     const isCompared = state.shade === "difference";
     const methods: Method[] = isCompared ? ["exact", roughOf(state)] : [state.method];
     for (const method of methods) {
       if (answers[method]) continue;
-      answers[method] = await askDistances(mesh, questionOf(state, method), onProgress, signal);
+      const { sources, ...question } = questionOf(state, method);
+      answers[method] = fieldOf(await service.distances(mesh, sources, { ...question, ...call }));
       if (method === "approximate") answers.error = state.error;
       if (method === "fast") answers.effort = state.effort;
     }
     if (state.shade === "territories") {
       // Borders are exact in any case.
-      answers.nearest ??= await askTerritories(mesh, questionOf(state, "exact"), signal);
+      answers.nearest ??= await askTerritories(mesh, questionOf(state, "exact"), call);
     }
     if (state.shade === "proof" && state.method !== "fast") {
       const question = questionOf(state, state.method);
-      answers.proofs[state.method] ??= await askProof(mesh, question, onProgress, signal);
+      answers.proofs[state.method] ??= await askProof(mesh, question, call);
     }
   }
 
@@ -148,7 +169,7 @@ export class Fields {
       const errors = errorsOf(exact, rough);
       const largest = largestOf(errors);
       surface.setValues(errors, largest);
-      const bound = `${rough.bound.kind}: ${written(100 * rough.bound.value, 3)}`;
+      const bound = `${rough.error_bound.kind}: ${written(100 * rough.error_bound.value, 3)}`;
       showScale(`Error, % (${bound})`, largest);
       return;
     }
@@ -181,25 +202,57 @@ export class Fields {
     byId("measured-exact").textContent = exact && (approximate ?? fast) ? "0" : "–";
     for (const [method, rough] of Object.entries({ approximate, fast })) {
       byId(`time-${method}`).textContent = timeOf(rough);
-      byId(`bound-${method}`).textContent = rough ? percent(rough.bound.value) : "–";
+      byId(`bound-${method}`).textContent = rough ? percent(rough.error_bound.value) : "–";
       byId(`measured-${method}`).textContent =
         exact && rough ? percent(largestOf(errorsOf(exact, rough)) / 100) : "–";
     }
   }
 }
 
+export function fieldOf(answer: Distances): Field {
+  const reached = answer.distances.filter((distance) => distance < Infinity);
+  return { ...answer, largest: largestOf(reached) };
+}
+
+/** Prove the distances from the sources of a question. */
+export async function askProof(
+  mesh: string,
+  { sources, ...question }: FieldQuestion,
+  call: Call,
+): Promise<Proof> {
+  const asked = { ...question, certify: true, include: ["violations" as const], ...call };
+  const { certificate, violations } = await service.distances(mesh, sources, asked);
+  if (!certificate || !violations) throw new Error("The service returned no proof.");
+  return { certificate, violations };
+}
+
+/** Return the index of the nearest source of each vertex, -1 where there is none. */
+async function askTerritories(
+  mesh: string,
+  { sources, ...question }: FieldQuestion,
+  call: Call,
+): Promise<Int32Array> {
+  const asked = { ...question, include: ["nearest_source" as const], ...call };
+  return (await service.distances(mesh, sources, asked)).nearest_source ?? new Int32Array();
+}
+
 function isAsked({ distances, isReadable }: State): boolean {
   return distances && isReadable;
 }
 
-/** Return the body of a query for distances. */
-export function questionOf(state: State, method: Method): Question {
+type FieldQuestion = Pick<
+  Question<"distances">,
+  "sources" | "method" | "relativeError" | "effort" | "maxDistance" | "barriers"
+>;
+
+/** Return a question for distances. */
+export function questionOf(state: State, method: Method): FieldQuestion {
   return {
-    sources: startsOf(state) as Question["sources"],
+    sources: startsOf(state),
     method,
-    ...(method === "approximate" ? { relative_error: state.error } : {}),
+    ...(method === "approximate" ? { relativeError: state.error } : {}),
     ...(method === "fast" ? { effort: state.effort } : {}),
-    ...(state.maxDistance === null ? {} : { max_distance: state.maxDistance }),
+    ...(state.maxDistance === null ? {} : { maxDistance: state.maxDistance }),
     ...(state.barriers.length > 0 ? { barriers: state.barriers } : {}),
   };
 }
@@ -210,12 +263,15 @@ function roughOf({ method }: State): Exclude<Method, "exact"> {
 }
 
 /** Return what there is to know about a field but its colours. */
-function notesOn({ bound, unreachable, warnings }: Field, { method, shade }: State): string[] {
+function notesOn(
+  { error_bound, unreachable, warnings }: Field,
+  { method, shade }: State,
+): string[] {
   const { disconnected, beyond_max_distance } = unreachable;
   const said = (n: number, what: string): string[] =>
     n > 0 ? [`${count(n, "vertex", "vertices")} ${what}`] : [];
   return [
-    ...(method === "exact" ? [] : [`Distances: ${boundInWords(bound)}.`]),
+    ...(method === "exact" ? [] : [`Distances: ${boundInWords(error_bound)}.`]),
     ...(shade === "proof" && method === "fast"
       ? ["Fast distances have no proof: choose another method."]
       : []),
@@ -236,7 +292,7 @@ function proofInWords({ holds, relative_gap, worst_face }: Certificate): string 
 }
 
 /** Return at each vertex the largest value of its faces. */
-function atVertices(ofFaces: number[], mesh: LoadedMesh): Float64Array {
+function atVertices(ofFaces: Float64Array, mesh: LoadedMesh): Float64Array {
   const largest = new Float64Array(mesh.document.vertices);
   for (const [face, value] of ofFaces.entries()) {
     for (const vertex of mesh.corners(face)) {

@@ -1,6 +1,7 @@
 // Isolines: requested when the field or the levels change, then drawn.
-import { askIsolines, type IsolinesQuestion } from "../api/queries";
+import type { Question, Source } from "geodesic-client";
 import type { Notes } from "../panel/notes";
+import { service } from "../service";
 import type { Lines, State } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
@@ -27,14 +28,15 @@ export class Isolines {
     // Where nothing but the sources is reached, there is no line.
     const question =
       isDrawn && field && field.largest > 0 ? isolinesOf(state, lines, field.largest) : null;
-    const isEmpty = question && "levels" in question && question.levels.length === 0;
+    const isEmpty = question?.levels?.length === 0;
     if (!mesh || !question || isEmpty) {
       this.drawing.clear();
       return;
     }
     const asked = JSON.stringify([mesh, question, state.method]);
     this.drawing.follow(asked, async (onProgress, signal) => {
-      const answer = await askIsolines(mesh, question, onProgress, signal);
+      const { sources, ...rest } = question;
+      const answer = await service.isolines(mesh, sources, { ...rest, onProgress, signal });
       const isOfOtherMethod = answer.method !== state.method;
       return () => {
         this.sceneView.showIsolines(answer.isolines.flatMap((level) => level.lines));
@@ -52,14 +54,17 @@ export class Isolines {
   }
 }
 
-/** Return the body of a query for isolines, up to the largest distance. */
+type IsolinesQuestion = Question<"isolines"> & { sources: Source[] };
+
+/** Return a question for isolines, up to the largest distance. */
 export function isolinesOf(
   state: State,
   lines: NonNullable<Lines>,
   largest: number,
 ): IsolinesQuestion {
   // From a fast field they would take as long as exact ones.
-  const question = questionOf(state, state.method === "fast" ? "approximate" : state.method);
+  const method = state.method === "fast" ? "approximate" : state.method;
+  const question = { ...questionOf(state, method), method };
   if ("count" in lines) return { ...question, count: lines.count };
   const count = Math.floor(largest / lines.spacing);
   return {

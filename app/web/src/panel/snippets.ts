@@ -1,7 +1,9 @@
 // The current query as a curl command and as a Python program.
-import type { Point } from "../api/types";
+
+import { type Question, toWire } from "geodesic-client";
 import { questionOf } from "../ask/fields";
 import { endOf, stopsOf } from "../state/places";
+import type { Point } from "../state/point";
 import type { State } from "../state/state";
 
 interface Query {
@@ -9,17 +11,22 @@ interface Query {
   body: unknown;
 }
 
+/** Return the question for the path from a source to a target. */
+export function pathOf(state: State, source: Point, target: Point): Question<"path"> {
+  return { source, target, waypoints: stopsOf(state), barriers: state.barriers };
+}
+
 /** Return the query for the path where there is a target, otherwise for the distances. */
 function queryOf(state: State, source: Point): Query {
-  const { barriers } = state;
-  const [target, waypoints] = [endOf(state), stopsOf(state)];
+  const target = endOf(state);
   const mesh = `v1/meshes/${state.mesh}`;
-  if (!target) return { path: `${mesh}/distances`, body: questionOf(state, state.method) };
+  if (!target) return { path: `${mesh}/distances`, body: toWire(questionOf(state, state.method)) };
+  const { waypoints, barriers, ...question } = pathOf(state, source, target);
   const more = {
-    ...(waypoints.length > 0 && { waypoints }),
-    ...(barriers.length > 0 && { barriers }),
+    ...(waypoints?.length && { waypoints }),
+    ...(barriers?.length && { barriers }),
   };
-  return { path: `${mesh}/path`, body: { source, target, ...more } };
+  return { path: `${mesh}/path`, body: toWire({ ...question, ...more }) };
 }
 
 export function curlOf(state: State, source: Point, service: string, hasKey: boolean): string {

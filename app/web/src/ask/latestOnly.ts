@@ -1,5 +1,5 @@
 // A queue of one: only the latest request is worth an answer.
-import { isAbort } from "./http";
+import { isAbort } from "../service";
 
 const PATIENCE_MS = 100;
 
