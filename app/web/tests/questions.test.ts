@@ -56,9 +56,9 @@ describe("paths", () => {
     barriers: [7],
   };
 
-  async function outlinesOf(question: RouteQuestion, isOld = () => false): Promise<PathAnswer[]> {
+  async function outlinesOf(question: RouteQuestion, refines = () => true): Promise<PathAnswer[]> {
     const outlines = [];
-    for await (const outline of askRoute("m", question, signal, isOld)) outlines.push(outline);
+    for await (const outline of askRoute("m", question, signal, refines)) outlines.push(outline);
     return outlines;
   }
 
@@ -81,7 +81,7 @@ describe("paths", () => {
     fakeService({ "POST /v1/meshes/m/path": () => json({ length: 3 }) });
     const question = { ...route, sources: route.sources.slice(0, 1) };
 
-    expect(await outlinesOf(question, () => true)).toEqual([{ length: 3 }]);
+    expect(await outlinesOf(question, () => false)).toEqual([{ length: 3 }]);
   });
 
   test.each([
@@ -93,7 +93,7 @@ describe("paths", () => {
       "POST /v1/meshes/m/path": () => json({ length: 2 }),
     });
     const { sources, ...rest } = { ...route, waypoints };
-    const [outline] = await outlinesOf({ sources, ...rest }, () => true);
+    const [outline] = await outlinesOf({ sources, ...rest }, () => false);
     expect(outline).toEqual({ length: 2 });
 
     expect(requests.map(({ body }) => body)).toEqual([

@@ -14,11 +14,12 @@ import type { FacePoint } from "../mesh/picking";
 import type { Notes } from "../panel/notes";
 import { service } from "../service";
 import { nameOf, startsOf } from "../state/places";
-import { type State, unitOf } from "../state/state";
+import { INITIAL, type State, unitOf } from "../state/state";
 import { PATIENCE_MS, type Status } from "../status";
 import { hideLegend, showHere, showProof, showScale, showTerritories } from "../view/legend";
 import type { SceneView } from "../view/sceneView";
 import type { Surface } from "../view/surface";
+import { LatestOnly } from "./latestOnly";
 
 /** Distances to all vertices, infinite where unreachable. */
 export interface Field extends Distances {
@@ -32,12 +33,17 @@ interface Proof {
   violations: Float64Array;
 }
 
+/** Faces from which exact distances take noticeably longer than fast ones. */
+const MANY_FACES = 50_000;
+
 /** Answers for one set of sources, barriers and limit. */
 interface Answers {
   key: string;
   exact?: Field;
   approximate?: Field;
   fast?: Field;
+  /** Fast distances of least effort, shown until those that were asked for are there. */
+  rough?: Field;
   /** The error allowed in ``approximate``, and the effort of ``fast``. */
   error?: number;
   effort?: Effort;
@@ -45,78 +51,129 @@ interface Answers {
   proofs: Partial<Record<Method, Proof>>;
 }
 
+/** A state that asks for distances. */
+type Asked = State & { mesh: string };
+
 export class Fields {
   /** Called when the colours have changed. */
   onPaint: (state: State) => void = () => undefined;
   private answers: Answers = { key: "", proofs: {} };
   private requested = "";
-  private stop = new AbortController();
+  private state: State = INITIAL;
+  private latest: Asked | null = null;
+  private clearing = 0;
+  private readonly latestOnly: LatestOnly<Asked>;
 
   constructor(
-    private readonly status: Status,
+    status: Status,
     private readonly sceneView: SceneView,
     private readonly notes: Notes,
-  ) {}
+  ) {
+    this.latestOnly = new LatestOnly<Asked>(
+      (asked, stop) =>
+        status.during("busy", "Computing distances…", stop, (onProgress) =>
+          this.answer(asked, { onProgress, signal: stop.signal }),
+        ),
+      (error) => status.fail(error),
+    );
+  }
 
-  /** Return the field that is drawn, or null. */
+  /** Return the field that was asked for, once it is there. */
   of(state: State): Field | null {
-    return isAsked(state) ? (this.answers[state.method] ?? null) : null;
+    return isAsked(state) ? (this.answersTo(state)[state.method] ?? null) : null;
+  }
+
+  /** Return the field that is drawn: a rough one until then. */
+  private shown(state: State): Field | null {
+    return this.of(state) ?? (isAsked(state) ? (this.answersTo(state).rough ?? null) : null);
+  }
+
+  /** Return the answers that are there, without those for another error or effort. */
+  private answersTo(state: State): Answers {
+    const key = keyOf(state);
+    const { answers } = this;
+    if (key !== answers.key) return { key, proofs: {} };
+    if (state.error !== answers.error) {
+      delete answers.approximate;
+      delete answers.proofs.approximate;
+    }
+    if (state.effort !== answers.effort) delete answers.fast;
+    return answers;
   }
 
   /** Return the nearest source of each vertex, where it is drawn; else null. */
-  territories({ shade }: State): Int32Array | null {
-    return shade === "territories" ? (this.answers.nearest ?? null) : null;
+  territories(state: State): Int32Array | null {
+    return state.shade === "territories" ? (this.answersTo(state).nearest ?? null) : null;
   }
 
   /** Request what ``state`` needs and has not been answered yet, and paint it. */
   follow(state: State): void {
-    const { mesh, barriers, maxDistance, method, error, effort, shade } = state;
-    const sources = isAsked(state) ? startsOf(state) : [];
-    const asked = [mesh, sources, barriers, maxDistance, method, error, effort, shade];
-    const requested = JSON.stringify(asked);
+    this.state = state;
+    const { mesh, method, error, effort, shade } = state;
+    const requested = JSON.stringify([keyOf(state), method, error, effort, shade]);
     if (requested === this.requested) return;
     this.requested = requested;
-    this.stop.abort();
-    this.stop = new AbortController();
-    const key = JSON.stringify([mesh, sources, barriers, maxDistance]);
-    if (key !== this.answers.key) this.answers = { key, proofs: {} };
-    if (error !== this.answers.error) {
-      delete this.answers.approximate;
-      delete this.answers.proofs.approximate;
+    const isQuestion = mesh !== null && isAsked(state) && startsOf(state).length > 0;
+    this.latest = isQuestion ? { ...state, mesh } : null;
+    if (this.latest) {
+      this.latestOnly.ask(this.latest);
+      // Until the answer is there, the one before remains for a moment only.
+      this.clearing ||= setTimeout(() => this.paint(this.state), PATIENCE_MS);
+    } else {
+      this.latestOnly.cancel();
+      this.paint(state);
     }
-    if (effort !== this.answers.effort) delete this.answers.fast;
-    if (!mesh || sources.length === 0) this.paint(state);
-    else this.request(mesh, state);
   }
 
-  private request(mesh: string, state: State): void {
-    const stop = new AbortController();
-    this.stop = stop;
-    const isLatest = (): boolean => this.stop === stop;
-    // Until the answer is there, the one before remains for a moment only.
-    const clearing = setTimeout(() => isLatest() && this.paint(state), PATIENCE_MS);
-    this.status.run("busy", "Computing distances…", stop, async (onProgress) => {
-      try {
-        await this.fetchMissing(mesh, state, onProgress, stop.signal);
-      } catch (failure) {
-        // After a failure or an abort, the same request may be made again.
-        if (isLatest()) this.requested = "";
-        throw failure;
-      } finally {
-        clearTimeout(clearing);
-        if (isLatest()) this.paint(state);
+  private async answer(asked: Asked, call: Call & { signal: AbortSignal }): Promise<void> {
+    const answers = this.answersTo(asked);
+    try {
+      if (this.takesLong(asked, answers)) {
+        const { sources, ...question } = questionOf({ ...asked, effort: 1 }, "fast");
+        answers.rough = fieldOf(
+          await service.distances(asked.mesh, sources, { ...question, ...call }),
+        );
+        this.show(answers, asked);
+        if (!this.latestOnly.refines()) return;
       }
-    });
+      await this.fetchMissing(answers, asked, call);
+      this.show(answers, asked);
+    } catch (failure) {
+      if (asked === this.latest) {
+        // After a failure or an abort, the same request may be made again.
+        this.requested = "";
+        delete answers.rough;
+        this.paint(this.state);
+      }
+      throw failure;
+    }
   }
 
-  private async fetchMissing(
-    mesh: string,
-    state: State,
-    onProgress: (share: number) => void,
-    signal: AbortSignal,
-  ): Promise<void> {
-    const { answers } = this;
-    const call = { onProgress, signal };
+  /** Whether a rough answer is worth while. */
+  private takesLong({ method, shade }: Asked, answers: Answers): boolean {
+    const faces = this.sceneView.mesh?.document.faces ?? 0;
+    const isPlain = shade === "distance" || shade === "territories";
+    return faces >= MANY_FACES && isPlain && method !== "fast" && !answers[method];
+  }
+
+  /** Paint answers, also those for points that have been pulled on meanwhile, for a moment. */
+  private show(answers: Answers, asked: Asked): void {
+    const { surface, mesh } = this.sceneView;
+    if (keyOf(asked) === keyOf(this.state)) {
+      this.answers = answers;
+      this.paint(this.state);
+    } else if (isPulled(asked, this.state) && surface && mesh) {
+      const field = answers[asked.method] ?? answers.rough;
+      if (field) this.paintField(surface, mesh, field, asked, answers);
+      clearTimeout(this.clearing);
+      this.clearing = setTimeout(() => this.paint(this.state), PATIENCE_MS);
+      this.onPaint(this.state);
+      this.sceneView.stage.invalidate();
+    }
+  }
+
+  private async fetchMissing(answers: Answers, state: Asked, call: Call): Promise<void> {
+    const { mesh } = state;
     const isCompared = state.shade === "difference";
     const methods: Method[] = isCompared ? ["exact", roughOf(state)] : [state.method];
     for (const method of methods) {
@@ -138,14 +195,16 @@ export class Fields {
 
   /** Paint the answers that are there; a mesh without any stays grey. */
   paint(state: State): void {
+    clearTimeout(this.clearing);
+    this.clearing = 0;
     const { surface, mesh } = this.sceneView;
-    const field = this.of(state);
-    this.compare();
+    const field = this.shown(state);
+    this.compare(this.answersTo(state));
     if (!surface || !mesh) return;
-    surface.setTerritories(null);
     this.notes.tell("distances", field ? notesOn(field, state) : []);
-    if (field) this.paintField(surface, mesh, field, state);
+    if (field) this.paintField(surface, mesh, field, state, this.answers);
     else {
+      surface.setTerritories(null);
       surface.setValues(null, 1);
       hideLegend();
     }
@@ -153,11 +212,18 @@ export class Fields {
     this.sceneView.stage.invalidate();
   }
 
-  private paintField(surface: Surface, mesh: LoadedMesh, field: Field, state: State): void {
+  private paintField(
+    surface: Surface,
+    mesh: LoadedMesh,
+    field: Field,
+    state: State,
+    answers: Answers,
+  ): void {
     const { shade, starts } = state;
-    const { exact, nearest } = this.answers;
-    const rough = this.answers[roughOf(state)];
-    const proof = this.answers.proofs[state.method];
+    const { exact, nearest } = answers;
+    const rough = answers[roughOf(state)];
+    const proof = answers.proofs[state.method];
+    surface.setTerritories(null);
     showProof(proof ? proofInWords(proof.certificate) : null);
     if (shade === "proof" && proof) {
       const violations = atVertices(proof.violations, mesh);
@@ -178,12 +244,15 @@ export class Fields {
     if (shade === "territories" && nearest) {
       surface.setTerritories(nearest);
       showTerritories(Array.from({ length: starts }, (_, i) => nameOf(state, i)));
-    } else showScale(`Distance in ${unitOf(state)}`, largest);
+    } else {
+      const isRough = field === answers.rough;
+      showScale(`${isRough ? "Rough distance" : "Distance"} in ${unitOf(state)}`, largest);
+    }
   }
 
   /** Tell the distance at a point, interpolated within its face; null: nowhere. */
   tell(point: FacePoint | null, state: State): void {
-    const field = this.of(state);
+    const field = this.shown(state);
     const mesh = this.sceneView.mesh;
     const isTold = point && field && mesh && !["difference", "proof"].includes(state.shade);
     const value = isTold
@@ -195,8 +264,7 @@ export class Fields {
   }
 
   /** Show time and error of all methods side by side. */
-  private compare(): void {
-    const { exact, approximate, fast } = this.answers;
+  private compare({ exact, approximate, fast }: Answers): void {
     byId("time-exact").textContent = timeOf(exact);
     byId("bound-exact").textContent = exact ? "0" : "–";
     byId("measured-exact").textContent = exact && (approximate ?? fast) ? "0" : "–";
@@ -236,6 +304,19 @@ async function askTerritories(
   return (await service.distances(mesh, sources, asked)).nearest_source ?? new Int32Array();
 }
 
+/** Return what answers belong to. */
+function keyOf(state: State): string {
+  const { mesh, barriers, maxDistance } = state;
+  return JSON.stringify([mesh, isAsked(state) ? startsOf(state) : [], barriers, maxDistance]);
+}
+
+/** Whether two states ask for distances that differ by where the sources are at most. */
+function isPulled(before: State, now: State): boolean {
+  const fixed = ({ mesh, barriers, maxDistance, method, shade, starts }: State): string =>
+    JSON.stringify([mesh, barriers, maxDistance, method, shade, starts]);
+  return isAsked(now) && startsOf(now).length > 0 && fixed(before) === fixed(now);
+}
+
 function isAsked({ distances, isReadable }: State): boolean {
   return distances && isReadable;
 }
@@ -268,10 +349,11 @@ function notesOn(
   { method, shade }: State,
 ): string[] {
   const { disconnected, beyond_max_distance } = unreachable;
+  const isExact = method === "exact" && error_bound.value === 0;
   const said = (n: number, what: string): string[] =>
     n > 0 ? [`${count(n, "vertex", "vertices")} ${what}`] : [];
   return [
-    ...(method === "exact" ? [] : [`Distances: ${boundInWords(error_bound)}.`]),
+    ...(isExact ? [] : [`Distances: ${boundInWords(error_bound)}.`]),
     ...(shade === "proof" && method === "fast"
       ? ["Fast distances have no proof: choose another method."]
       : []),

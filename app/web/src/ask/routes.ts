@@ -111,8 +111,8 @@ export class Routes {
   private async answer(request: RouteRequest, signal: AbortSignal): Promise<void> {
     const { mesh, ...question } = request;
     try {
-      const isOld = () => request !== this.request;
-      for await (const outline of askRoute(mesh, question, signal, isOld)) {
+      const refines = () => this.latestOnly.refines();
+      for await (const outline of askRoute(mesh, question, signal, refines)) {
         this.show(outline, request);
       }
     } catch (failure) {
@@ -141,7 +141,8 @@ export class Routes {
   private note(): void {
     const { outline, unit } = this;
     if (!outline) return;
-    const bound = outline.method === "exact" ? "exact" : boundInWords(outline.error_bound);
+    const bound =
+      outline.method === "exact" ? "exact" : `rough: ${boundInWords(outline.error_bound)}`;
     byId("length-note").textContent =
       outline.length == null ? reason(outline) : `${unit}, ${bound}`;
     byId("length-names").textContent = this.names.join(" → ");
@@ -200,12 +201,12 @@ export async function* askRoute(
   mesh: string,
   question: RouteQuestion,
   signal: AbortSignal,
-  isOld: () => boolean,
+  refines: () => boolean,
 ): AsyncGenerator<PathAnswer> {
   const { target, waypoints, barriers } = question;
   const source = await nearestSource(mesh, question, signal);
   for (const method of ["fast", "exact"] as const) {
-    if (method === "exact" && isOld()) return;
+    if (method === "exact" && !refines()) return;
     yield await service.path(mesh, source, target, { waypoints, barriers, method, signal });
   }
 }
