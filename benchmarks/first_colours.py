@@ -1,4 +1,4 @@
-"""From a click on the page to rough colours and to exact ones, and tasks while a start is dragged."""
+"""From a click on the page to rough colours and to exact ones; tasks while a start is dragged."""
 
 import json
 import shutil

@@ -21,11 +21,16 @@ import { service } from "./service";
 import { readSample, readState, writeState } from "./state/permalink";
 import { type State, Store, unitOf, withMesh } from "./state/state";
 import { Status } from "./status";
+import type { Rgb } from "./view/colours";
 import { drawRamp } from "./view/legend";
 import { Stage } from "./view/scene";
 import { SceneView } from "./view/sceneView";
 
 const ADDRESS_DELAY_MS = 250; // browsers limit changes of the address to a hundred in half a minute
+
+/** Colours of lines in files. */
+const ROUTE: Rgb = [0.9, 0, 0.36];
+const ISOLINE: Rgb = [0.1, 0.12, 0.16];
 
 const stage = new Stage(byId("canvas", HTMLCanvasElement));
 const sceneView = new SceneView(stage);
@@ -52,6 +57,24 @@ listenToKeys(store, status, sceneView, pointer);
 drawRamp(store.state.palette);
 exportPanel.largest = () => fields.of(store.state)?.largest ?? 0;
 exportPanel.nearest = () => routes.source;
+exportPanel.drawn = () => {
+  const { mesh } = sceneView;
+  const { palette, range } = store.state;
+  const field = fields.of(store.state);
+  const path = routes.outline?.points ?? [];
+  return (
+    mesh && {
+      ...{ mesh, palette },
+      field: field && { values: field.distances, largest: range ?? field.largest },
+      lines: [
+        ...(path.length > 1 ? [{ name: "path", points: path, colour: ROUTE }] : []),
+        ...isolines.lines.map(({ points }) => ({
+          ...{ name: "isoline", points: points ?? [], colour: ISOLINE },
+        })),
+      ],
+    }
+  );
+};
 controls.usualSpacing = () => Number(((exportPanel.largest() || 1) / 20).toPrecision(1));
 stage.onMove = (view) => store.replace({ view, up: sceneView.mesh?.frame.up ?? null });
 fields.onPaint = (state) => {

@@ -1,5 +1,5 @@
 // Isolines: requested when the field or the levels change, then drawn.
-import type { Question, Source } from "geodesic-client";
+import type { Isoline, Question, Source } from "geodesic-client";
 import type { Notes } from "../panel/notes";
 import { service } from "../service";
 import type { Lines, State } from "../state/state";
@@ -9,6 +9,8 @@ import { Drawing } from "./drawing";
 import { boundInWords, type Fields, questionOf } from "./fields";
 
 export class Isolines {
+  /** The lines that are drawn. */
+  lines: Isoline[] = [];
   private readonly drawing: Drawing;
 
   constructor(
@@ -17,7 +19,7 @@ export class Isolines {
     private readonly fields: Fields,
     private readonly notes: Notes,
   ) {
-    this.drawing = new Drawing(status, notes, "isolines", () => sceneView.showIsolines([]));
+    this.drawing = new Drawing(status, notes, "isolines", () => this.show([]));
   }
 
   /** Request the isolines that `state` needs and that are not drawn yet, and draw them. */
@@ -39,13 +41,18 @@ export class Isolines {
       const answer = await service.isolines(mesh, sources, { ...rest, onProgress, signal });
       const isOfOtherMethod = answer.method !== state.method;
       return () => {
-        this.sceneView.showIsolines(answer.isolines.flatMap((level) => level.lines));
+        this.show(answer.isolines.flatMap((level) => level.lines));
         this.notes.tell("isolines", [
           ...(isOfOtherMethod ? [`Isolines: ${boundInWords(answer.error_bound)}.`] : []),
           ...answer.warnings,
         ]);
       };
     });
+  }
+
+  private show(lines: Isoline[]): void {
+    this.lines = lines;
+    this.sceneView.showIsolines(lines);
   }
 
   /** Draw them again on a mesh that has been opened anew. */

@@ -79,6 +79,11 @@ export class LoadedMesh {
     return [faces[3 * face]!, faces[3 * face + 1]!, faces[3 * face + 2]!];
   }
 
+  /** Positions of the vertices, in mesh units. */
+  get vertices(): Float64Array {
+    return this.shape.vertices;
+  }
+
   /** Return the position of a vertex, in mesh units. */
   vertex(index: number): Triple {
     const { vertices } = this.shape;

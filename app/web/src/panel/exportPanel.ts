@@ -10,6 +10,7 @@ import { endOf, startsOf } from "../state/places";
 import type { Point } from "../state/point";
 import type { State, Store } from "../state/state";
 import type { Status } from "../status";
+import { type Drawn, glbOf } from "../view/glb";
 import type { Stage } from "../view/scene";
 import { curlOf, pathOf, pythonOf } from "./snippets";
 
@@ -43,6 +44,22 @@ export class ExportPanel {
       pythonOf(store.state, this.source(), service.address, hasKey()),
     );
     byId("picture").addEventListener("click", () => this.savePicture());
+    byId("glb").addEventListener("click", () => {
+      status.run("busy", "Writing what is drawn…", new AbortController(), async () => {
+        const drawn = this.drawn();
+        if (drawn) download(await glbOf(drawn), "geodesic.glb");
+      });
+    });
+    byId("geojson").addEventListener("click", () => {
+      const lines = this.drawn()?.lines ?? [];
+      const features = lines.map(({ name, points }) => ({
+        type: "Feature",
+        properties: { name },
+        geometry: { type: "LineString", coordinates: points },
+      }));
+      const text = JSON.stringify({ type: "FeatureCollection", features });
+      download(new Blob([text], { type: "application/geo+json" }), "geodesic.geojson");
+    });
   }
 
   /** Offer the formats that the service writes, and name the others. */
@@ -82,7 +99,9 @@ export class ExportPanel {
         choice.disabled = !isThere;
     }
     for (const id of ["copy-curl", "copy-python"]) byId(id, HTMLButtonElement).disabled = !hasField;
-    byId("picture", HTMLButtonElement).disabled = state.mesh === null;
+    for (const id of ["picture", "glb", "geojson"]) {
+      byId(id, HTMLButtonElement).disabled = state.mesh === null;
+    }
   }
 
   private save(what: Product, format: string): void {
@@ -110,6 +129,9 @@ export class ExportPanel {
     const question = questionOf(state, state.method);
     return service.file(mesh, "distances", { ...question, signal }, format);
   }
+
+  /** Return what is drawn, in mesh units. */
+  drawn: () => Drawn | null = () => null;
 
   /** Return the largest distance that is drawn. */
   largest: () => number = () => 0;
