@@ -441,7 +441,11 @@ export class GeodesicClient {
 }
 
 /** Return a question as the body of a request: in the service's names, without what is no member. */
-export function toWire({ signal: _, onProgress: __, ...question }: object & Call): Record<string, unknown> {
+export function toWire({
+  signal: _,
+  onProgress: __,
+  ...question
+}: object & Call): Record<string, unknown> {
   return Object.fromEntries(
     Object.entries(question).map(([name, value]) => [
       name.replace(/[A-Z]/g, (letter) => `_${letter.toLowerCase()}`),
