@@ -18,7 +18,9 @@ from benchmarks.tables import Section, rated
 FACES = {100_000: 150.0, 1_000_000: 600.0}
 """Numbers of faces, and the most milliseconds from a click to rough colours"""
 DRAGGED, MOST_TASK_MS = 100_000, 100.0
-RADIUS, CLICKS, MOVES = 60.0, 12, 90
+RADIUS, SWAY, CLICKS, MOVES = 60.0, 20.0, 6, 40
+
+Place = tuple[float, float]
 
 _WATCH = """() => {
     const title = document.getElementById('legend-title');
@@ -68,14 +70,14 @@ def _of_size(browser: Browser, port: int, faces: int, most_ms: float) -> list[li
     page.goto(f"http://127.0.0.1:{port}/?mesh={mesh}&lines=none&source=v0")
     _rest(page)
     page.evaluate(_WATCH)
-    rough, exact = _clicks(page)
+    rough, exact, place = _clicks(page)
     named = f"{faces:,} faces"
     rows = [
         [f"{named}: rough colours, ms", rated(rough, most_ms, at_least=False, digits=0)],
         [f"{named}: exact colours, ms", f"{exact:.0f}"],
     ]
     if faces == DRAGGED:
-        longest, painted = _drag(browser, page)
+        longest, painted = _drag(browser, page, place)
         limit = rated(longest, MOST_TASK_MS, at_least=False, digits=0)
         rows.append([f"{named}: longest task while dragging, ms", limit])
         rows.append([f"{named}: rough colours while dragging, a second", f"{painted:.1f}"])
@@ -95,41 +97,40 @@ def _middle(page: Page) -> tuple[float, float]:
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
 
-def _clicks(page: Page) -> tuple[float, float]:
-    """Return the medians of milliseconds until rough and until exact colours."""
+def _clicks(page: Page) -> tuple[float, float, Place]:
+    """Return the medians of milliseconds until rough and exact colours, and the last place."""
     found: dict[str, list[float]] = {"Rough distance": [], "Distance": []}
+    place = (0.0, 0.0)
     for vertex in range(CLICKS):
-        page.keyboard.press("Control+z")  # a click then sets a start once more
-        _rest(page)
         page.evaluate("() => { document.getElementById('clear').click(); }")
         _rest(page)
         page.evaluate("() => { window.times.length = 0; }")
-        _click_on_mesh(page, vertex)
+        place = _click_on_mesh(page, vertex)
         _rest(page)
         for words, milliseconds in page.evaluate("() => window.times"):
             found[words.partition(" in ")[0]].append(milliseconds)
-    return tuple(float(np.median(each)) for each in found.values())  # type: ignore[return-value]
+    rough, exact = (float(np.median(each)) for each in found.values())
+    return rough, exact, place
 
 
-def _click_on_mesh(page: Page, number: int) -> None:
-    """Click on a place where the mesh is, one of many."""
+def _click_on_mesh(page: Page, number: int) -> Place:
+    """Click on a place where the mesh is, one of many, and return it."""
     x, y = _middle(page)
     for attempt in range(20):
         angle = 2 * pi * (number / CLICKS + attempt / 20)
-        page.mouse.move(x + 1.5 * RADIUS * cos(angle), y + 1.5 * RADIUS * sin(angle))
+        place = x + 1.5 * RADIUS * cos(angle), y + 1.5 * RADIUS * sin(angle)
+        page.mouse.move(*place)
         page.wait_for_timeout(50)
         if "A" in page.inner_text("#cue"):
             break
     page.mouse.down()
     page.mouse.up()
+    return place
 
 
-def _drag(browser: Browser, page: Page) -> tuple[float, float]:
-    """Drag the start around; return the longest task, ms, and colours painted a second."""
-    x, y = page.evaluate("""() => {
-        const box = document.querySelector('#labels > *').getBoundingClientRect();
-        return [box.x + box.width / 2, box.y + box.height / 2];
-    }""")
+def _drag(browser: Browser, page: Page, place: Place) -> tuple[float, float]:
+    """Drag the start from its place; return the longest task, ms, and colours painted a second."""
+    x, y = place
     page.mouse.move(x, y)
     page.evaluate("() => { window.times.length = 0; }")
     with TemporaryDirectory() as folder:
@@ -137,7 +138,7 @@ def _drag(browser: Browser, page: Page) -> tuple[float, float]:
         browser.start_tracing(page=page, path=trace, categories=["toplevel", "devtools.timeline"])
         page.mouse.down()
         for i in range(MOVES):
-            page.mouse.move(x + RADIUS * sin(0.1 * i), y + 0.5 * RADIUS * (1 - cos(0.1 * i)))
+            page.mouse.move(x + SWAY * sin(0.1 * i), y)
             page.wait_for_timeout(16)
         page.mouse.up()
         browser.stop_tracing()
