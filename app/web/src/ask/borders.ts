@@ -1,6 +1,7 @@
 // Borders of territories: requested when the surface is coloured by them, then drawn.
-import { askBorders, type BordersQuestion } from "../api/queries";
+import type { Question } from "geodesic-client";
 import type { Notes } from "../panel/notes";
+import { service } from "../service";
 import type { State } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
@@ -31,7 +32,12 @@ export class Borders {
     }
     const question = bordersOf(state);
     this.drawing.follow(JSON.stringify([mesh, question]), async (onProgress, signal) => {
-      const { borders, warnings } = await askBorders(mesh, question, onProgress, signal);
+      const { sources, ...rest } = question;
+      const { borders, warnings } = await service.borders(mesh, sources, {
+        ...rest,
+        onProgress,
+        signal,
+      });
       return () => {
         this.sceneView.showBorders(nearest, borders);
         this.notes.tell("borders", warnings);
@@ -45,8 +51,8 @@ export class Borders {
   }
 }
 
-/** Return the body of a query for borders, which are exact by any method. */
-export function bordersOf(state: State): BordersQuestion {
+/** Return a question for borders, which are exact by any method. */
+export function bordersOf(state: State): Question<"borders"> {
   const { method: _, ...question } = questionOf(state, "exact");
   return question;
 }

@@ -1,6 +1,7 @@
 // Isolines: requested when the field or the levels change, then drawn.
-import { askIsolines, type IsolinesQuestion } from "../api/queries";
+import type { Isoline, Question, Source } from "geodesic-client";
 import type { Notes } from "../panel/notes";
+import { service } from "../service";
 import type { Lines, State } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
@@ -8,6 +9,8 @@ import { Drawing } from "./drawing";
 import { boundInWords, type Fields, questionOf } from "./fields";
 
 export class Isolines {
+  /** The lines that are drawn. */
+  lines: Isoline[] = [];
   private readonly drawing: Drawing;
 
   constructor(
@@ -16,7 +19,7 @@ export class Isolines {
     private readonly fields: Fields,
     private readonly notes: Notes,
   ) {
-    this.drawing = new Drawing(status, notes, "isolines", () => sceneView.showIsolines([]));
+    this.drawing = new Drawing(status, notes, "isolines", () => this.show([]));
   }
 
   /** Request the isolines that `state` needs and that are not drawn yet, and draw them. */
@@ -27,17 +30,18 @@ export class Isolines {
     // Where nothing but the sources is reached, there is no line.
     const question =
       isDrawn && field && field.largest > 0 ? isolinesOf(state, lines, field.largest) : null;
-    const isEmpty = question && "levels" in question && question.levels.length === 0;
+    const isEmpty = question?.levels?.length === 0;
     if (!mesh || !question || isEmpty) {
       this.drawing.clear();
       return;
     }
     const asked = JSON.stringify([mesh, question, state.method]);
     this.drawing.follow(asked, async (onProgress, signal) => {
-      const answer = await askIsolines(mesh, question, onProgress, signal);
+      const { sources, ...rest } = question;
+      const answer = await service.isolines(mesh, sources, { ...rest, onProgress, signal });
       const isOfOtherMethod = answer.method !== state.method;
       return () => {
-        this.sceneView.showIsolines(answer.isolines.flatMap((level) => level.lines));
+        this.show(answer.isolines.flatMap((level) => level.lines));
         this.notes.tell("isolines", [
           ...(isOfOtherMethod ? [`Isolines: ${boundInWords(answer.error_bound)}.`] : []),
           ...answer.warnings,
@@ -46,20 +50,28 @@ export class Isolines {
     });
   }
 
+  private show(lines: Isoline[]): void {
+    this.lines = lines;
+    this.sceneView.showIsolines(lines);
+  }
+
   /** Draw them again on a mesh that has been opened anew. */
   forget(): void {
     this.drawing.forget();
   }
 }
 
-/** Return the body of a query for isolines, up to the largest distance. */
+type IsolinesQuestion = Question<"isolines"> & { sources: Source[] };
+
+/** Return a question for isolines, up to the largest distance. */
 export function isolinesOf(
   state: State,
   lines: NonNullable<Lines>,
   largest: number,
 ): IsolinesQuestion {
   // From a fast field they would take as long as exact ones.
-  const question = questionOf(state, state.method === "fast" ? "approximate" : state.method);
+  const method = state.method === "fast" ? "approximate" : state.method;
+  const question = { ...questionOf(state, method), method };
   if ("count" in lines) return { ...question, count: lines.count };
   const count = Math.floor(largest / lines.spacing);
   return {

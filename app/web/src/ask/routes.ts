@@ -1,16 +1,23 @@
 // The path to the target, which follows the pointer: fast at first, and the shortest once the
 // pointer rests. And the steps of its search.
-import { LatestOnly } from "../api/latestOnly";
-import { askRoute, askSteps, pointOf, type RouteQuestion } from "../api/queries";
-import type { Outline, Point, Step } from "../api/types";
+import type { PathAnswer, Step } from "geodesic-client";
 import { byId, count, written } from "../dom";
 import type { Notes } from "../panel/notes";
+import { service } from "../service";
 import { endOf, nameOf, startsOf, stopsOf } from "../state/places";
-import { writePoint } from "../state/point";
+import { type Point, pointOf, writePoint } from "../state/point";
 import { type State, unitOf } from "../state/state";
 import { PATIENCE_MS, type Status } from "../status";
 import type { SceneView } from "../view/sceneView";
 import { boundInWords } from "./fields";
+import { LatestOnly } from "./latestOnly";
+
+export interface RouteQuestion {
+  sources: Point[];
+  target: Point;
+  waypoints: Point[];
+  barriers: number[];
+}
 
 type RouteRequest = RouteQuestion & { mesh: string };
 
@@ -24,7 +31,7 @@ const WORDS: Record<Step["name"], string> = {
 };
 
 export class Routes {
-  outline: Outline | null = null;
+  outline: PathAnswer | null = null;
   private requested = "";
   private unit = "";
   private names: string[] = [];
@@ -104,8 +111,8 @@ export class Routes {
   private async answer(request: RouteRequest, signal: AbortSignal): Promise<void> {
     const { mesh, ...question } = request;
     try {
-      const isOld = () => request !== this.request;
-      for await (const outline of askRoute(mesh, question, signal, isOld)) {
+      const refines = () => this.latestOnly.refines();
+      for await (const outline of askRoute(mesh, question, signal, refines)) {
         this.show(outline, request);
       }
     } catch (failure) {
@@ -115,7 +122,7 @@ export class Routes {
     }
   }
 
-  private show(outline: Outline, request: RouteRequest): void {
+  private show(outline: PathAnswer, request: RouteRequest): void {
     if (!this.request || !isPulled(request, this.request)) return;
     clearTimeout(this.clearing);
     this.clearing = 0;
@@ -134,7 +141,8 @@ export class Routes {
   private note(): void {
     const { outline, unit } = this;
     if (!outline) return;
-    const bound = outline.method === "exact" ? "exact" : boundInWords(outline.error_bound);
+    const bound =
+      outline.method === "exact" ? "exact" : `rough: ${boundInWords(outline.error_bound)}`;
     byId("length-note").textContent =
       outline.length == null ? reason(outline) : `${unit}, ${bound}`;
     byId("length-names").textContent = this.names.join(" → ");
@@ -146,7 +154,10 @@ export class Routes {
     const { mesh, ...question } = request;
     const stop = new AbortController();
     this.status.run("busy", "Searching step by step…", stop, async () => {
-      const steps = await askSteps(mesh, question, stop.signal);
+      const { target, waypoints, barriers } = question;
+      const source = await nearestSource(mesh, question, stop.signal);
+      const call = { waypoints, barriers, signal: stop.signal };
+      const { steps } = await service.pathSteps(mesh, source, target, call);
       if (request !== this.request) return;
       this.steps = steps;
       byId("explain-start").hidden = true;
@@ -182,6 +193,43 @@ export class Routes {
   }
 }
 
+/**
+ * Yield a fast path, then the shortest, unless there is a newer question by then; of several
+ * sources, both start at the nearest.
+ */
+export async function* askRoute(
+  mesh: string,
+  question: RouteQuestion,
+  signal: AbortSignal,
+  refines: () => boolean,
+): AsyncGenerator<PathAnswer> {
+  const { target, waypoints, barriers } = question;
+  const source = await nearestSource(mesh, question, signal);
+  for (const method of ["fast", "exact"] as const) {
+    if (method === "exact" && !refines()) return;
+    yield await service.path(mesh, source, target, { waypoints, barriers, method, signal });
+  }
+}
+
+/** Return the source that is nearest to where a path goes first; the first where none has a way. */
+async function nearestSource(
+  mesh: string,
+  { sources, target, waypoints, barriers }: RouteQuestion,
+  signal: AbortSignal,
+): Promise<Point> {
+  let nearest = 0;
+  if (sources.length > 1) {
+    const { nearest_source } = await service.distances(mesh, sources, {
+      targets: [waypoints[0] ?? target],
+      barriers,
+      include: ["nearest_source"],
+      signal,
+    });
+    nearest = Math.max(0, nearest_source?.[0] ?? 0);
+  }
+  return sources[nearest] as Point;
+}
+
 /** Whether two requests differ by the points of the path after its start at most. */
 function isPulled(before: RouteRequest, now: RouteRequest): boolean {
   const fixed = ({ mesh, sources, barriers }: RouteRequest): string =>
@@ -189,7 +237,7 @@ function isPulled(before: RouteRequest, now: RouteRequest): boolean {
   return fixed(before) === fixed(now);
 }
 
-function reason({ reason: code }: Outline): string {
+function reason({ reason: code }: PathAnswer): string {
   return code === "disconnected"
     ? "start and end are not connected"
     : "the end is farther than the distance limit";

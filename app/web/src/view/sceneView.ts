@@ -1,7 +1,8 @@
 // The mesh on the stage, with points, path, barriers and faults on it.
+
+import type { Border, Isoline, MeshDocument, PathAnswer } from "geodesic-client";
 import { Mesh, PlaneGeometry, Vector3 } from "three";
 import type { MeshBVH } from "three-mesh-bvh";
-import type { Border, Line, MeshDocument, Outline } from "../api/types";
 import { frontOf, type Up } from "../mesh/frame";
 import { type LoadedMesh, loadMesh } from "../mesh/loader";
 import { type FacePoint, isSeen, pick, positionOf } from "../mesh/picking";
@@ -167,7 +168,7 @@ export class SceneView {
     this.barriers.show(this.mesh, isReadable ? barriers : []);
   }
 
-  showRoute(outline: Outline | null): void {
+  showRoute(outline: PathAnswer | null): void {
     const points = this.mesh ? (outline?.points ?? []) : [];
     this.route.show(points.map((point) => this.mesh!.drawn(point)));
   }
@@ -179,14 +180,14 @@ export class SceneView {
     this.walkEnd.show(drawn.slice(-1).map((position) => ({ position, fill: WALK, size: 13 })));
   }
 
-  showRays(rays: Pick<Line, "points">[]): void {
+  showRays(rays: Pick<Isoline, "points">[]): void {
     this.rays.show(
       this.mesh,
       rays.map(({ points }) => ({ points, closed: false })),
     );
   }
 
-  showIsolines(lines: Line[]): void {
+  showIsolines(lines: Isoline[]): void {
     this.isolines.show(this.mesh, lines);
   }
 
