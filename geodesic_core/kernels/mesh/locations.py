@@ -140,10 +140,12 @@ def locate_in_face(
         for axis in range(3):
             locations.points[i, axis] = 0.0
         for k in range(3):
-            v, weight = links[3 * face + k, TAIL], weights[row, k]
-            locations.weights[i, corner_of(topology, faces, outer, v)] = weight
+            v = links[3 * face + k, TAIL]
+            locations.weights[i, corner_of(topology, faces, outer, v)] = weights[row, k]
+        for k in range(3):  # in the caller's order, so that it rounds as given points do
+            v = topology.inner_vertex[faces[outer, k]]
             for axis in range(3):
-                locations.points[i, axis] += weight * positions[v, axis]
+                locations.points[i, axis] += locations.weights[i, k] * positions[v, axis]
 
 
 @kernel
