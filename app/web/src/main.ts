@@ -1,10 +1,12 @@
 // The page's parts and their wiring: users change the state, and every part follows it.
 import { getMesh, makeSample } from "./api/meshes";
 import { getAbout } from "./api/queries";
-import type { About, MeshDocument } from "./api/types";
+import type { About, MeshDocument, Outline } from "./api/types";
 import { Borders } from "./ask/borders";
+import { Boundaries } from "./ask/boundaries";
 import { Fields } from "./ask/fields";
 import { Isolines } from "./ask/isolines";
+import { PathProofs } from "./ask/proofs";
 import { Rays } from "./ask/rays";
 import { Routes } from "./ask/routes";
 import { Walks } from "./ask/walks";
@@ -12,12 +14,16 @@ import { byId } from "./dom";
 import { Player } from "./film/player";
 import { foldOnPhone, isDark, setFolded, setUpAppearance } from "./panel/appearance";
 import { Controls, located } from "./panel/controls";
+import { Cutting } from "./panel/cutting";
 import { ExportPanel } from "./panel/exportPanel";
 import { listenToKeys } from "./panel/keys";
 import { Meshes } from "./panel/meshes";
 import { Notes } from "./panel/notes";
+import { Numbers } from "./panel/numbers";
 import { PlaceList } from "./panel/placeList";
 import { Pointer } from "./panel/pointer";
+import { ProfileChart } from "./panel/profile";
+import { Regions } from "./panel/regions";
 import { showReport } from "./panel/report";
 import { readSample, readState, writeState } from "./state/permalink";
 import { type State, Store, unitOf, withMesh } from "./state/state";
@@ -37,11 +43,29 @@ const fields = new Fields(status, sceneView, notes);
 const isolines = new Isolines(status, sceneView, fields, notes);
 const borders = new Borders(status, sceneView, fields, notes);
 const rays = new Rays(status, sceneView, fields, notes);
+const boundaries = new Boundaries(status, sceneView, notes);
 const walks = new Walks(status, sceneView, notes);
 const routes = new Routes(status, sceneView, notes);
 const meshes = new Meshes(store, status);
 const controls = new Controls(store, status, sceneView, notes);
 const placeList = new PlaceList(store);
+const proofs = new PathProofs(store, status, () => sceneView.mesh);
+const profile = new ProfileChart((position) => sceneView.showSpot(position));
+const numbers = new Numbers(store, status, () => sceneView.mesh?.document ?? null);
+const cutting = new Cutting(
+  store,
+  status,
+  notes,
+  () => ({
+    path: routes.outline,
+    walk: walks.line,
+    largest: fields.of(store.state)?.largest ?? 0,
+    up: sceneView.mesh?.frame.up ?? null,
+    view: stage.view,
+  }),
+  () => meshes.list(),
+);
+new Regions(store, status, notes);
 const exportPanel = new ExportPanel(store, status, stage);
 const player = new Player(store, status, sceneView, () => {
   fields.paint(store.state);
@@ -54,11 +78,18 @@ drawRamp(store.state.palette);
 exportPanel.largest = () => fields.of(store.state)?.largest ?? 0;
 exportPanel.nearest = () => routes.source;
 controls.usualSpacing = () => Number(((exportPanel.largest() || 1) / 20).toPrecision(1));
+meshes.onNumbers = (file) => numbers.take(file);
+routes.onDraw = (outline) => {
+  proofs.follow(outline);
+  showProfile(outline);
+  cutting.show();
+};
 stage.onMove = (view) => store.replace({ view, up: sceneView.mesh?.frame.up ?? null });
 fields.onPaint = (state) => {
   isolines.follow(state);
   borders.follow(state);
   rays.follow(state);
+  cutting.show();
   player.redraw();
   pointer.rehover();
 };
@@ -82,9 +113,13 @@ store.listen((state, before) => {
   fields.follow(state);
   routes.follow(state);
   walks.follow(state);
+  boundaries.follow(state);
+  numbers.show(state);
+  cutting.show();
   player.follow(state);
   if (state.unit !== before.unit) nameUnit(state);
-  if (state.range !== before.range) fields.paint(state);
+  const paints = ["range", "least", "values"] as const;
+  if (paints.some((each) => state[each] !== before[each])) fields.paint(state);
   if (state.palette !== before.palette) showPalette(state);
   if (state.lines !== before.lines) isolines.follow(state);
   if (state.polar !== before.polar) rays.follow(state);
@@ -108,6 +143,10 @@ function nameUnit(state: State): void {
   if (report) showReport(report, sceneView, unitOf(state), meshes.joiningOf(report.id));
 }
 
+function showProfile(outline: Outline | null): void {
+  profile.show(outline, sceneView.mesh?.frame.up ?? "y", unitOf(store.state));
+}
+
 function showPalette({ palette }: State): void {
   drawRamp(palette);
   sceneView.surface?.setPalette(palette);
@@ -129,6 +168,7 @@ function open(mesh: string): void {
   isolines.forget();
   borders.forget();
   rays.forget();
+  boundaries.forget();
   report = null;
   notes.begin(report);
   showReport(report, sceneView, "", null);
@@ -151,6 +191,7 @@ function open(mesh: string): void {
     fields.paint(now);
     routes.draw();
     walks.draw();
+    boundaries.follow(now);
     showPalette(now);
     await showWires(now);
   });

@@ -1,11 +1,12 @@
-// Borders of territories: requested when the surface is coloured by them, then drawn.
+// Borders and areas of territories: requested when the surface is coloured by them, then shown.
 import { askBorders, type BordersQuestion } from "../api/queries";
+import { askCells } from "../api/tools";
 import type { Notes } from "../panel/notes";
 import type { State } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
 import { Drawing } from "./drawing";
-import { type Fields, questionOf } from "./fields";
+import { type Fields, questionOf, shadeOf } from "./fields";
 
 export class Borders {
   private readonly drawing: Drawing;
@@ -22,9 +23,9 @@ export class Borders {
 
   /** Request the borders that `state` shows and that are not drawn yet, and draw them. */
   follow(state: State): void {
-    const { mesh, starts, shade } = state;
+    const { mesh, starts } = state;
     const nearest = this.fields.territories(state);
-    const isDrawn = starts > 1 && shade === "territories" && this.sceneView.surface;
+    const isDrawn = starts > 1 && shadeOf(state) === "territories" && this.sceneView.surface;
     if (!mesh || !nearest || !isDrawn) {
       this.drawing.clear();
       return;
@@ -32,9 +33,11 @@ export class Borders {
     const question = bordersOf(state);
     this.drawing.follow(JSON.stringify([mesh, question]), async (onProgress, signal) => {
       const { borders, warnings } = await askBorders(mesh, question, onProgress, signal);
+      const cells = await askCells(mesh, question, { onProgress, signal });
       return () => {
         this.sceneView.showBorders(nearest, borders);
-        this.notes.tell("borders", warnings);
+        this.fields.tellAreas(cells.areas, state);
+        this.notes.tell("borders", [...warnings, ...cells.warnings]);
       };
     });
   }
@@ -47,6 +50,6 @@ export class Borders {
 
 /** Return the body of a query for borders, which are exact by any method. */
 export function bordersOf(state: State): BordersQuestion {
-  const { method: _, ...question } = questionOf(state, "exact");
+  const { method: _, ...question } = questionOf({ ...state, slope: null, tolls: null }, "exact");
   return question;
 }

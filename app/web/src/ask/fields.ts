@@ -5,15 +5,25 @@ import type { Certificate, Effort, ErrorBound, Method } from "../api/types";
 import { byId, count, duration, written } from "../dom";
 import type { LoadedMesh } from "../mesh/loader";
 import type { FacePoint } from "../mesh/picking";
+import { extremesOf } from "../mesh/values";
 import type { Notes } from "../panel/notes";
 import { nameOf, startsOf } from "../state/places";
-import { type State, unitOf } from "../state/state";
+import { type Shade, type State, unitOf, type Values } from "../state/state";
 import { PATIENCE_MS, type Status } from "../status";
-import { hideLegend, showHere, showProof, showScale, showTerritories } from "../view/legend";
+import { huesOf } from "../view/hues";
+import {
+  hideLegend,
+  showDifference,
+  showHere,
+  showProof,
+  showScale,
+  showTerritories,
+} from "../view/legend";
 import type { SceneView } from "../view/sceneView";
 import type { Surface } from "../view/surface";
+import { costKey, costOf, hasCost, measureOf } from "./costs";
 
-/** Answers for one set of sources, barriers and limit. */
+/** Answers for one set of sources, barriers, limit and cost. Of costs there is one method only. */
 interface Answers {
   key: string;
   exact?: Field;
@@ -23,6 +33,8 @@ interface Answers {
   error?: number;
   effort?: Effort;
   nearest?: Int32Array;
+  /** Areas of the territories. */
+  areas?: number[];
   proofs: Partial<Record<Method, Proof>>;
 }
 
@@ -41,25 +53,32 @@ export class Fields {
 
   /** Return the field that is drawn, or null. */
   of(state: State): Field | null {
-    return isAsked(state) ? (this.answers[state.method] ?? null) : null;
+    return isAsked(state) ? (this.answers[methodOf(state)] ?? null) : null;
   }
 
   /** Return the nearest source of each vertex, where it is drawn; else null. */
-  territories({ shade }: State): Int32Array | null {
-    return shade === "territories" ? (this.answers.nearest ?? null) : null;
+  territories(state: State): Int32Array | null {
+    return shadeOf(state) === "territories" ? (this.answers.nearest ?? null) : null;
+  }
+
+  /** Tell the areas of the territories that are drawn. */
+  tellAreas(areas: number[], state: State): void {
+    this.answers.areas = areas;
+    this.showTerritories(state);
   }
 
   /** Request what ``state`` needs and has not been answered yet, and paint it. */
   follow(state: State): void {
-    const { mesh, barriers, maxDistance, method, error, effort, shade } = state;
+    const { mesh, barriers, maxDistance, error, effort } = state;
     const sources = isAsked(state) ? startsOf(state) : [];
-    const asked = [mesh, sources, barriers, maxDistance, method, error, effort, shade];
+    const asks = [mesh, sources, barriers, maxDistance, costKey(state)];
+    const asked = [...asks, methodOf(state), error, effort, shadeOf(state), versusOf(state)];
     const requested = JSON.stringify(asked);
     if (requested === this.requested) return;
     this.requested = requested;
     this.stop.abort();
     this.stop = new AbortController();
-    const key = JSON.stringify([mesh, sources, barriers, maxDistance]);
+    const key = JSON.stringify(asks);
     if (key !== this.answers.key) this.answers = { key, proofs: {} };
     if (error !== this.answers.error) {
       delete this.answers.approximate;
@@ -97,19 +116,20 @@ export class Fields {
     signal: AbortSignal,
   ): Promise<void> {
     const { answers } = this;
-    const isCompared = state.shade === "difference";
-    const methods: Method[] = isCompared ? ["exact", roughOf(state)] : [state.method];
+    const shade = shadeOf(state);
+    const method = methodOf(state);
+    const methods = shade === "difference" ? [method, versusOf(state)] : [method];
     for (const method of methods) {
       if (answers[method]) continue;
       answers[method] = await askDistances(mesh, questionOf(state, method), onProgress, signal);
       if (method === "approximate") answers.error = state.error;
       if (method === "fast") answers.effort = state.effort;
     }
-    if (state.shade === "territories") {
+    if (shade === "territories") {
       // Borders are exact in any case.
       answers.nearest ??= await askTerritories(mesh, questionOf(state, "exact"), signal);
     }
-    if (state.shade === "proof" && state.method !== "fast") {
+    if (shade === "proof" && state.method !== "fast") {
       const question = questionOf(state, state.method);
       answers.proofs[state.method] ??= await askProof(mesh, question, onProgress, signal);
     }
@@ -122,8 +142,11 @@ export class Fields {
     this.compare();
     if (!surface || !mesh) return;
     surface.setTerritories(null);
+    showProof(null);
+    showDifference(null);
     this.notes.tell("distances", field ? notesOn(field, state) : []);
-    if (field) this.paintField(surface, mesh, field, state);
+    if (state.values) this.paintValues(surface, state.values, state);
+    else if (field) this.paintField(surface, mesh, field, state);
     else {
       surface.setValues(null, 1);
       hideLegend();
@@ -132,45 +155,76 @@ export class Fields {
     this.sceneView.stage.invalidate();
   }
 
+  private paintValues(surface: Surface, { name, numbers }: Values, state: State): void {
+    const [low, high] = extremesOf(numbers);
+    const [least, largest] = [state.least ?? low, state.range ?? high];
+    surface.setValues(numbers, largest, least);
+    showScale(name, largest, least);
+  }
+
   private paintField(surface: Surface, mesh: LoadedMesh, field: Field, state: State): void {
-    const { shade, starts } = state;
-    const { exact, nearest } = this.answers;
-    const rough = this.answers[roughOf(state)];
-    const proof = this.answers.proofs[state.method];
-    showProof(proof ? proofInWords(proof.certificate) : null);
+    const shade = shadeOf(state);
+    const { nearest } = this.answers;
+    const method = methodOf(state);
+    const other = this.answers[versusOf(state)];
+    const proof = this.answers.proofs[method];
+    showProof(proof && !hasCost(state) ? proofInWords(proof.certificate) : null);
     if (shade === "proof" && proof) {
       const violations = atVertices(proof.violations, mesh);
       surface.setValues(violations, proof.certificate.worst_violation);
       showScale(`Violation by face, ${unitOf(state)}`, proof.certificate.worst_violation);
       return;
     }
-    if (shade === "difference" && exact && rough) {
-      const errors = errorsOf(exact, rough);
-      const largest = largestOf(errors);
-      surface.setValues(errors, largest);
-      const bound = `${rough.bound.kind}: ${written(100 * rough.bound.value, 3)}`;
-      showScale(`Error, % (${bound})`, largest);
+    if (shade === "difference" && other) {
+      const { values, largest, mean } = differenceOf(field, other);
+      surface.setValues(values, largest);
+      showScale(`|${method} − ${versusOf(state)}| in ${unitOf(state)}`, largest);
+      const share = mean / (field.largest || 1);
+      showDifference(
+        `Largest ${written(largest, 3)}, mean ${written(mean, 3)} (${percent(share)} of the largest distance)`,
+      );
       return;
     }
-    const largest = state.range ?? field.largest;
-    surface.setValues(field.distances, largest);
+    const [least, largest] = [state.least ?? 0, state.range ?? field.largest];
+    surface.setValues(field.distances, largest, least);
     if (shade === "territories" && nearest) {
-      surface.setTerritories(nearest);
-      showTerritories(Array.from({ length: starts }, (_, i) => nameOf(state, i)));
-    } else showScale(`Distance in ${unitOf(state)}`, largest);
+      const hues = huesOf(state.starts, nearest, mesh);
+      this.sceneView.hues = hues;
+      surface.setTerritories(nearest.map((source) => hues[source] ?? source));
+      this.sceneView.showPoints(state);
+      this.showTerritories(state);
+    } else
+      showScale(`${hasCost(state) ? "Cost" : "Distance"} in ${measureOf(state)}`, largest, least);
+  }
+
+  private showTerritories(state: State): void {
+    const { areas } = this.answers;
+    const whole = areas?.reduce((sum, area) => sum + area, 0) ?? 0;
+    showTerritories(
+      Array.from({ length: state.starts }, (_, i) => {
+        const area = areas?.[i];
+        return {
+          name: nameOf(state, i),
+          area: area === undefined ? "" : `${written(area, 4)} (${percent(area / whole)})`,
+          colour: this.sceneView.colourOf(i),
+        };
+      }),
+      unitOf(state),
+    );
   }
 
   /** Tell the distance at a point, interpolated within its face; null: nowhere. */
   tell(point: FacePoint | null, state: State): void {
-    const field = this.of(state);
+    const numbers = state.values?.numbers ?? this.of(state)?.distances;
     const mesh = this.sceneView.mesh;
-    const isTold = point && field && mesh && !["difference", "proof"].includes(state.shade);
+    const isTold = point && numbers && mesh && !["difference", "proof"].includes(shadeOf(state));
     const value = isTold
       ? mesh
           .corners(point.face)
-          .reduce((sum, v, i) => sum + (point.barycentric[i] ?? 0) * (field.distances[v] ?? NaN), 0)
+          .reduce((sum, v, i) => sum + (point.barycentric[i] ?? 0) * (numbers[v] ?? NaN), 0)
       : Number.NaN;
-    showHere(Number.isFinite(value) ? `≈ ${written(value, 4)} ${unitOf(state)} here` : null);
+    const unit = state.values ? "" : ` ${measureOf(state)}`;
+    showHere(Number.isFinite(value) ? `≈ ${written(value, 4)}${unit} here` : null);
   }
 
   /** Show time and error of all methods side by side. */
@@ -188,14 +242,28 @@ export class Fields {
   }
 }
 
-function isAsked({ distances, isReadable }: State): boolean {
-  return distances && isReadable;
+function isAsked({ distances, isReadable, values }: State): boolean {
+  return distances && isReadable && !values;
 }
 
-/** Return the body of a query for distances. */
+/** Return what the surface is coloured by: costs have no other colours than their own. */
+export function shadeOf(state: State): Shade {
+  return hasCost(state) ? "distance" : state.shade;
+}
+
+function methodOf(state: State): Method {
+  return hasCost(state) ? "exact" : state.method;
+}
+
+/** Return the body of a query for distances, or for costs. */
 export function questionOf(state: State, method: Method): Question {
+  const cost = costOf(state);
+  const sources = startsOf(state) as Question["sources"];
+  if (cost) {
+    return { sources, cost, ...(state.barriers.length > 0 ? { barriers: state.barriers } : {}) };
+  }
   return {
-    sources: startsOf(state) as Question["sources"],
+    sources,
     method,
     ...(method === "approximate" ? { relative_error: state.error } : {}),
     ...(method === "fast" ? { effort: state.effort } : {}),
@@ -204,18 +272,24 @@ export function questionOf(state: State, method: Method): Question {
   };
 }
 
-/** Return the method that is compared with the exact one. */
-function roughOf({ method }: State): Exclude<Method, "exact"> {
-  return method === "exact" ? "approximate" : method;
+/** Return the method that the one of the question is compared with. */
+export function versusOf({ method, versus }: State): Method {
+  if (versus !== null && versus !== method) return versus;
+  return method === "exact" ? "approximate" : "exact";
 }
 
 /** Return what there is to know about a field but its colours. */
-function notesOn({ bound, unreachable, warnings }: Field, { method, shade }: State): string[] {
+function notesOn({ bound, unreachable, warnings }: Field, state: State): string[] {
+  const { method, shade } = state;
   const { disconnected, beyond_max_distance } = unreachable;
   const said = (n: number, what: string): string[] =>
     n > 0 ? [`${count(n, "vertex", "vertices")} ${what}`] : [];
   return [
-    ...(method === "exact" ? [] : [`Distances: ${boundInWords(bound)}.`]),
+    ...(hasCost(state)
+      ? [`Costs: ${boundInWords(bound)}.`]
+      : method === "exact"
+        ? []
+        : [`Distances: ${boundInWords(bound)}.`]),
     ...(shade === "proof" && method === "fast"
       ? ["Fast distances have no proof: choose another method."]
       : []),
@@ -230,8 +304,11 @@ export function boundInWords({ value, kind, type }: ErrorBound): string {
   return `error ${kind === "estimated" ? "about" : "at most"} ${size} (${kind})`;
 }
 
-function proofInWords({ holds, relative_gap, worst_face }: Certificate): string {
-  const size = `${relative_gap.toExponential(0)} of the largest distance`;
+export function proofInWords(
+  { holds, relative_gap, worst_face }: Certificate,
+  of = "the largest distance",
+): string {
+  const size = `${relative_gap.toExponential(0)} of ${of}`;
   return holds ? `✓ Proved to ${size}` : `Not proved: ${size} in doubt, most at face ${worst_face}`;
 }
 
@@ -253,6 +330,16 @@ function errorsOf(exact: Field, rough: Field): Float64Array {
     if (distance === Infinity || found === Infinity) return -1;
     return distance > 0 ? (100 * Math.abs(distance - found)) / distance : 0;
   });
+}
+
+/** Return by how much distances differ, infinite where unreachable; the largest and the mean. */
+function differenceOf(a: Field, b: Field): { values: Float64Array; largest: number; mean: number } {
+  const values = a.distances.map((distance, i) =>
+    distance === Infinity ? Infinity : Math.abs(distance - (b.distances[i] ?? Number.NaN)),
+  );
+  const known = values.filter(Number.isFinite);
+  const mean = known.reduce((sum, x) => sum + x, 0) / (known.length || 1);
+  return { values, largest: largestOf(known), mean };
 }
 
 function largestOf(values: Float64Array): number {

@@ -1,11 +1,14 @@
 // Isolines: requested when the field or the levels change, then drawn.
 import { askIsolines, type IsolinesQuestion } from "../api/queries";
+import { askLevelSets } from "../api/tools";
+import { extremesOf } from "../mesh/values";
 import type { Notes } from "../panel/notes";
-import type { Lines, State } from "../state/state";
+import type { Lines, State, Values } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
+import { hasCost } from "./costs";
 import { Drawing } from "./drawing";
-import { boundInWords, type Fields, questionOf } from "./fields";
+import { boundInWords, type Fields, questionOf, shadeOf } from "./fields";
 
 export class Isolines {
   private readonly drawing: Drawing;
@@ -21,9 +24,13 @@ export class Isolines {
 
   /** Request the isolines that `state` needs and that are not drawn yet, and draw them. */
   follow(state: State): void {
-    const { mesh, lines, shade } = state;
+    const { mesh, lines, values } = state;
+    if (mesh && values && lines && this.sceneView.surface) {
+      this.followValues(mesh, values, lines);
+      return;
+    }
     const field = this.fields.of(state);
-    const isDrawn = lines && shade !== "difference" && this.sceneView.surface;
+    const isDrawn = lines && shadeOf(state) !== "difference" && this.sceneView.surface;
     // Where nothing but the sources is reached, there is no line.
     const question =
       isDrawn && field && field.largest > 0 ? isolinesOf(state, lines, field.largest) : null;
@@ -35,9 +42,9 @@ export class Isolines {
     const asked = JSON.stringify([mesh, question, state.method]);
     this.drawing.follow(asked, async (onProgress, signal) => {
       const answer = await askIsolines(mesh, question, onProgress, signal);
-      const isOfOtherMethod = answer.method !== state.method;
+      const isOfOtherMethod = !hasCost(state) && answer.method !== state.method;
       return () => {
-        this.sceneView.showIsolines(answer.isolines.flatMap((level) => level.lines));
+        this.sceneView.showIsolines(answer.isolines);
         this.notes.tell("isolines", [
           ...(isOfOtherMethod ? [`Isolines: ${boundInWords(answer.error_bound)}.`] : []),
           ...answer.warnings,
@@ -46,10 +53,40 @@ export class Isolines {
     });
   }
 
+  private followValues(mesh: string, values: Values, lines: NonNullable<Lines>): void {
+    const question = levelSetsOf(values, lines);
+    if ("levels" in question && question.levels.length === 0) {
+      this.drawing.clear();
+      return;
+    }
+    const asked = JSON.stringify([mesh, values.key, lines]);
+    this.drawing.follow(asked, async (onProgress, signal) => {
+      const { isolines, warnings } = await askLevelSets(mesh, question, { onProgress, signal });
+      return () => {
+        this.sceneView.showIsolines(isolines);
+        this.notes.tell("isolines", warnings);
+      };
+    });
+  }
+
   /** Draw them again on a mesh that has been opened anew. */
   forget(): void {
     this.drawing.forget();
   }
+}
+
+/** Return the body of a query for the level sets of values. */
+export function levelSetsOf(
+  { numbers }: Values,
+  lines: NonNullable<Lines>,
+): { values: (number | null)[] } & ({ count: number } | { levels: number[] }) {
+  const values = Array.from(numbers, (x) => (Number.isFinite(x) ? x : null));
+  if ("count" in lines) return { values, count: lines.count };
+  const { spacing } = lines;
+  const [least, largest] = extremesOf(numbers);
+  const first = Math.floor(least / spacing) + 1;
+  const count = Math.max(0, Math.ceil(largest / spacing) - first);
+  return { values, levels: Array.from({ length: count }, (_, i) => (first + i) * spacing) };
 }
 
 /** Return the body of a query for isolines, up to the largest distance. */

@@ -7,6 +7,7 @@ import { startsOf } from "../state/places";
 import type { State } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
+import { hasCost } from "./costs";
 import { Drawing } from "./drawing";
 import { type Fields, questionOf } from "./fields";
 
@@ -34,7 +35,7 @@ export class Rays {
     const { mesh, barriers, polar } = state;
     const sources = startsOf(state);
     const largest = this.fields.of(state)?.largest ?? 0;
-    if (!mesh || !polar || largest === 0 || !this.sceneView.surface) {
+    if (!mesh || !polar || hasCost(state) || largest === 0 || !this.sceneView.surface) {
       this.drawing.clear();
       return;
     }

@@ -2,17 +2,20 @@
 // pointer rests. And the steps of its search.
 import { LatestOnly } from "../api/latestOnly";
 import { askRoute, askSteps, pointOf, type RouteQuestion } from "../api/queries";
+import { askCheapest, type SurfaceCost } from "../api/tools";
 import type { Outline, Point, Step } from "../api/types";
 import { byId, count, written } from "../dom";
+import { InputError } from "../inputError";
 import type { Notes } from "../panel/notes";
 import { endOf, nameOf, startsOf, stopsOf } from "../state/places";
 import { writePoint } from "../state/point";
 import { type State, unitOf } from "../state/state";
 import { PATIENCE_MS, type Status } from "../status";
 import type { SceneView } from "../view/sceneView";
+import { costKey, costOf, measureOf } from "./costs";
 import { boundInWords } from "./fields";
 
-type RouteRequest = RouteQuestion & { mesh: string };
+type RouteRequest = RouteQuestion & { mesh: string; cost: SurfaceCost | null };
 
 const WORDS: Record<Step["name"], string> = {
   dijkstra: "A path along edges: a first bound",
@@ -25,8 +28,11 @@ const WORDS: Record<Step["name"], string> = {
 
 export class Routes {
   outline: Outline | null = null;
+  /** Called when another path, or none, is drawn. */
+  onDraw: (outline: Outline | null) => void = () => undefined;
   private requested = "";
   private unit = "";
+  private measure = "";
   private names: string[] = [];
   private steps: Step[] = [];
   private request: RouteRequest | null = null;
@@ -58,16 +64,19 @@ export class Routes {
     const { mesh, barriers, isReadable } = state;
     const [sources, target, waypoints] = [startsOf(state), endOf(state), stopsOf(state)];
     this.unit = unitOf(state);
+    this.measure = measureOf(state);
     this.names = state.places.map((_, i) => nameOf(state, i)).slice(state.starts - 1);
     if (state.starts > 1) this.names[0] = "nearest start";
     this.note();
-    const requested = JSON.stringify([mesh, sources, target, waypoints, barriers, isReadable]);
+    const cost = costOf(state);
+    const asked = [mesh, sources, target, waypoints, barriers, isReadable];
+    const requested = JSON.stringify([...asked, cost && costKey(state), cost?.max_cost]);
     if (requested === this.requested) return;
     this.requested = requested;
     this.endSteps();
     const hasPath = mesh !== null && target !== null && isReadable;
-    this.request = hasPath ? { mesh, sources, target, waypoints, barriers } : null;
-    byId("explain-start", HTMLButtonElement).disabled = !hasPath;
+    this.request = hasPath ? { mesh, sources, target, waypoints, barriers, cost } : null;
+    byId("explain-start", HTMLButtonElement).disabled = !hasPath || cost !== null;
     if (this.request) {
       this.latestOnly.ask(this.request);
       this.clearSoon();
@@ -99,15 +108,17 @@ export class Routes {
   /** Draw the path that was found; a mesh that was just loaded shows none yet. */
   draw(): void {
     this.sceneView.showRoute(this.outline);
+    this.onDraw(this.outline);
   }
 
   private async answer(request: RouteRequest, signal: AbortSignal): Promise<void> {
-    const { mesh, ...question } = request;
+    const { mesh, cost, ...question } = request;
     try {
       const isOld = () => request !== this.request;
-      for await (const outline of askRoute(mesh, question, signal, isOld)) {
-        this.show(outline, request);
-      }
+      if (cost) this.show(await cheapest(mesh, question, cost, signal), request);
+      else
+        for await (const outline of askRoute(mesh, question, signal, isOld))
+          this.show(outline, request);
     } catch (failure) {
       // After a failure or an abort, the same request may be made again.
       if (request === this.request) this.requested = "";
@@ -126,8 +137,8 @@ export class Routes {
     const readout = byId("readout");
     readout.hidden = false;
     readout.dataset.target = writePoint(request.target);
-    const { length } = outline;
-    byId("length").textContent = length == null ? "No path" : written(length, 6);
+    const shown = outline.cost ?? outline.length;
+    byId("length").textContent = shown == null ? "No path" : written(shown, 6);
     this.note();
   }
 
@@ -135,15 +146,18 @@ export class Routes {
     const { outline, unit } = this;
     if (!outline) return;
     const bound = outline.method === "exact" ? "exact" : boundInWords(outline.error_bound);
-    byId("length-note").textContent =
-      outline.length == null ? reason(outline) : `${unit}, ${bound}`;
+    const words =
+      outline.cost == null
+        ? `${unit}, ${bound}`
+        : `${this.measure}, ${bound}; ${written(outline.length ?? 0, 6)} ${unit} long`;
+    byId("length-note").textContent = outline.length == null ? reason(outline) : words;
     byId("length-names").textContent = this.names.join(" → ");
   }
 
   private explain(): void {
     const { request } = this;
     if (!request) return;
-    const { mesh, ...question } = request;
+    const { mesh, cost: _, ...question } = request;
     const stop = new AbortController();
     this.status.run("busy", "Searching step by step…", stop, async () => {
       const steps = await askSteps(mesh, question, stop.signal);
@@ -182,15 +196,37 @@ export class Routes {
   }
 }
 
+/** Return the cheapest path from the source from where it is cheapest. */
+async function cheapest(
+  mesh: string,
+  { sources, target, waypoints, barriers }: RouteQuestion,
+  cost: SurfaceCost,
+  signal: AbortSignal,
+): Promise<Outline> {
+  if (waypoints.length > 0) {
+    throw new InputError(
+      "No stops on the cheapest path",
+      "The service finds cheapest paths from one point to another only.",
+      "Remove the stops, or the cost.",
+    );
+  }
+  const found = await Promise.all(
+    sources.map((source) => askCheapest(mesh, { source, target, barriers, cost }, signal)),
+  );
+  const costFrom = ({ cost: each }: Outline): number => each ?? Infinity;
+  return found.reduce((best, each) => (costFrom(each) < costFrom(best) ? each : best));
+}
+
 /** Whether two requests differ by the points of the path after its start at most. */
 function isPulled(before: RouteRequest, now: RouteRequest): boolean {
   const fixed = ({ mesh, sources, barriers }: RouteRequest): string =>
     JSON.stringify([mesh, sources, barriers]);
-  return fixed(before) === fixed(now);
+  return fixed(before) === fixed(now) && (before.cost === null) === (now.cost === null);
 }
 
 function reason({ reason: code }: Outline): string {
-  return code === "disconnected"
-    ? "start and end are not connected"
+  if (code === "disconnected") return "start and end are not connected";
+  return code === "beyond_max_cost"
+    ? "the end costs more than the limit"
     : "the end is farther than the distance limit";
 }

@@ -23,7 +23,7 @@ const ENDS: Record<StraightLine["stopped"], string> = {
 export class Walks {
   private requested = "";
   private request: WalkRequest | null = null;
-  private line: StraightLine | null = null;
+  line: StraightLine | null = null;
   private unit = "";
   private readonly latestOnly: LatestOnly<WalkRequest>;
 

@@ -2,6 +2,8 @@
 import { getMesh } from "../api/meshes";
 import { locate } from "../api/queries";
 import type { Effort, Method, Point } from "../api/types";
+import { hasCost } from "../ask/costs";
+import { versusOf } from "../ask/fields";
 import { byId, query, written } from "../dom";
 import type { Up } from "../mesh/frame";
 import { LONGEST_UNIT, readState, type WrittenState, writeRanges } from "../state/permalink";
@@ -12,6 +14,7 @@ import {
   type Lines,
   NO_QUESTION,
   type Palette,
+  RULES,
   type Shade,
   type State,
   type Store,
@@ -59,6 +62,18 @@ export class Controls {
     });
     byId("lines").addEventListener("change", () => this.readLines(true));
     byId("lines-value").addEventListener("change", () => this.readLines(false));
+    byId("boundary").addEventListener("change", () =>
+      store.update({ boundary: byId("boundary", HTMLInputElement).checked }),
+    );
+    byId("versus").addEventListener("change", () => {
+      const versus = byId("versus", HTMLSelectElement).value as Method;
+      store.update({ versus, shade: "difference" });
+    });
+    byId("slope").addEventListener("change", () => {
+      const rule = RULES.find((each) => each === byId("slope", HTMLSelectElement).value);
+      const up = sceneView.mesh?.frame.up ?? "z";
+      store.update({ slope: rule ? { rule, up } : null });
+    });
     byId("polar").addEventListener("change", () => {
       const polar = byId("polar", HTMLInputElement).checked;
       store.update({ polar, lines: store.state.lines ?? (polar ? INITIAL.lines : null) });
@@ -66,10 +81,12 @@ export class Controls {
     byId("palette").addEventListener("change", () =>
       store.update({ palette: byId("palette", HTMLSelectElement).value as Palette }),
     );
-    byId("range").addEventListener("change", () => {
-      const range = byId("range", HTMLInputElement).valueAsNumber;
-      store.update({ range: range > 0 ? range : null });
-    });
+    for (const end of ["least", "range"] as const) {
+      byId(end).addEventListener("change", () => {
+        const value = byId(end, HTMLInputElement).valueAsNumber;
+        store.update({ [end]: Number.isFinite(value) ? value : null });
+      });
+    }
     const unit = byId("unit", HTMLInputElement);
     unit.maxLength = LONGEST_UNIT;
     unit.addEventListener("change", () => store.update({ unit: unit.value.trim() }));
@@ -107,6 +124,15 @@ export class Controls {
     byId("epsilon").hidden = state.method !== "approximate";
     byId("efforts").hidden = state.method !== "fast";
     choose("shades", state.shade);
+    byId("shades").hidden = byId("more-method").hidden = hasCost(state);
+    byId("versus", HTMLSelectElement).value = versusOf(state);
+    for (const option of byId("versus", HTMLSelectElement).options)
+      option.disabled = option.value === state.method;
+    byId("slope", HTMLSelectElement).value = state.slope?.rule ?? "";
+    byId("cost-now").textContent = !hasCost(state)
+      ? "their length"
+      : [state.slope?.rule, state.tolls?.name].filter(Boolean).join(" × ");
+    byId("boundary", HTMLInputElement).checked = state.boundary;
     setValue("error-slider", String(Math.log10(state.error)));
     showError(state.error);
     byId("effort", HTMLSelectElement).value = String(state.effort);
@@ -121,6 +147,7 @@ export class Controls {
     byId("polar", HTMLInputElement).checked = state.polar;
     setValue("unit", state.unit);
     byId("palette", HTMLSelectElement).value = state.palette;
+    setValue("least", state.least === null ? "" : String(state.least));
     setValue("range", state.range === null ? "" : String(state.range));
     byId("wireframe", HTMLInputElement).checked = state.wireframe;
   }

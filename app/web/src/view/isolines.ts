@@ -6,17 +6,22 @@ import { ribbonMesh, ribbons } from "./ribbon";
 import { LINES, type Stage } from "./scene";
 
 export class IsolineLayer {
-  private readonly object = ribbonMesh({
-    colour: 0xffffff,
-    casing: 0x1e293b,
-    inner: 1.2,
-    width: 2.6,
-    opacity: 1,
-    before: 0.001,
-    order: 1,
-  });
+  private readonly object: ReturnType<typeof ribbonMesh>;
 
-  constructor(private readonly stage: Stage) {
+  constructor(
+    private readonly stage: Stage,
+    colour = 0xffffff,
+    inner = 1.2,
+  ) {
+    this.object = ribbonMesh({
+      colour,
+      casing: 0x1e293b,
+      inner,
+      width: inner + 1.4,
+      opacity: 1,
+      before: 0.001,
+      order: 1,
+    });
     this.object.visible = false;
     this.object.layers.set(LINES);
     stage.add(this.object);

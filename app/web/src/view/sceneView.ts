@@ -1,7 +1,7 @@
 // The mesh on the stage, with points, path, barriers and faults on it.
 import { Mesh, PlaneGeometry, Vector3 } from "three";
 import type { MeshBVH } from "three-mesh-bvh";
-import type { Border, Line, MeshDocument, Outline } from "../api/types";
+import type { Border, IsolinesAnswer, Line, MeshDocument, Outline } from "../api/types";
 import { frontOf, type Up } from "../mesh/frame";
 import { type LoadedMesh, loadMesh } from "../mesh/loader";
 import { type FacePoint, isSeen, pick, positionOf } from "../mesh/picking";
@@ -24,6 +24,8 @@ const END: Rgb = [0.9, 0, 0.36];
 const STOP: Rgb = [0.96, 0.62, 0.04];
 const FAULT: Rgb = [0.85, 0.1, 0.1];
 const WALK: Rgb = [0.15, 0.39, 0.92];
+const SPOT: Rgb = [1, 0.8, 0.1];
+const BOUNDARY = 0xffa11f;
 const ROUTE_LINE = 0xe6005c;
 const WALK_LINE = 0x2563eb;
 
@@ -33,12 +35,16 @@ export class SceneView {
   readonly faults: Patch;
   mesh: LoadedMesh | null = null;
   surface: Surface | null = null;
+  /** The colour of each territory; one without is coloured by its number. */
+  hues: number[] = [];
   private readonly paint = surfacePaint();
   private tree: MeshBVH | null = null;
   private readonly points: Markers;
   private readonly faultPoints: Markers;
   private readonly isolines: IsolineLayer;
   private readonly rays: IsolineLayer;
+  private readonly boundary: IsolineLayer;
+  private readonly spot: Markers;
   private readonly route: RouteLine;
   private readonly walk: RouteLine;
   private readonly walkEnd: Markers;
@@ -51,12 +57,14 @@ export class SceneView {
     this.faults = new Patch(stage, 0xd9121f, 0.9);
     this.isolines = new IsolineLayer(stage);
     this.rays = new IsolineLayer(stage);
+    this.boundary = new IsolineLayer(stage, BOUNDARY, 2.6);
     this.route = new RouteLine(stage, ROUTE_LINE);
     this.walk = new RouteLine(stage, WALK_LINE);
     this.walkEnd = new Markers(stage);
     this.territories = new Territories(stage, this.paint);
     this.points = new Markers(stage);
     this.faultPoints = new Markers(stage);
+    this.spot = new Markers(stage);
     this.warmUp();
     this.labels = new Labels(stage, (position) => this.isSeen(position));
     stage.onFrame = () => {
@@ -106,6 +114,8 @@ export class SceneView {
     this.faultPoints.show([]);
     this.isolines.show(null, []);
     this.rays.show(null, []);
+    this.boundary.show(null, []);
+    this.showSpot(null);
     this.route.show([]);
     this.showWalk([]);
     this.showBorders(new Int32Array(), []);
@@ -155,7 +165,7 @@ export class SceneView {
     const shown = places.flatMap(({ point }, i) => {
       if (!mesh?.has(point) || !isReadable) return [];
       const isStop = i >= starts && i < places.length - 1;
-      const fill = i < starts ? (hasTerritories ? territory(i) : START) : isStop ? STOP : END;
+      const fill = i < starts ? (hasTerritories ? this.colourOf(i) : START) : isStop ? STOP : END;
       const position = mesh.drawn(positionOf(mesh, point));
       return { position, fill, size: isStop ? 14 : 17, name: nameOf(state, i) };
     });
@@ -186,13 +196,33 @@ export class SceneView {
     );
   }
 
-  showIsolines(lines: Line[]): void {
-    this.isolines.show(this.mesh, lines);
+  showBoundary(lines: Line[]): void {
+    this.boundary.show(this.mesh, lines);
+  }
+
+  /** Mark a position on the path; null: none. */
+  showSpot(position: Triple | null): void {
+    const { mesh } = this;
+    this.spot.show(
+      mesh && position ? [{ position: mesh.drawn(position), fill: SPOT, size: 15 }] : [],
+    );
+  }
+
+  /** Return the colour of the territory of a source. */
+  colourOf(source: number): Rgb {
+    return territory(this.hues[source] ?? source);
+  }
+
+  showIsolines(levels: IsolinesAnswer["isolines"]): void {
+    this.isolines.show(
+      this.mesh,
+      levels.flatMap(({ lines }) => lines),
+    );
   }
 
   /** Show the borders of territories; ``nearest`` is the nearest source of each vertex. */
   showBorders(nearest: Int32Array, borders: Border[]): void {
-    this.territories.show(this.mesh, nearest, borders);
+    this.territories.show(this.mesh, nearest, borders, (source) => this.colourOf(source));
   }
 
   showFaults(faces: number[], points: [number, number, number][]): void {

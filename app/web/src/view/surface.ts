@@ -32,10 +32,11 @@ const VERTEX = /* glsl */ `
     gl_Position = projectionMatrix * eye;
   }`;
 
-// A value below 0 means unreached: one such vertex turns its whole face grey.
+// Values are shares of the range of colours; far below it means unreached: one such vertex turns its
+// whole face grey.
 const FRAGMENT = /* glsl */ `
+  const float UNREACHED = -1e3;
   uniform sampler2D ramp;
-  uniform float largest;
   uniform float tinted;
   uniform vec3 clay;
   varying float v_value;
@@ -44,8 +45,8 @@ const FRAGMENT = /* glsl */ `
   varying vec3 v_eye;
   void main() {
     vec3 colour = clay;
-    if (v_value >= 0.0) {
-      float share = clamp(v_value / largest, 0.0, 1.0);
+    if (v_value > UNREACHED) {
+      float share = clamp(v_value, 0.0, 1.0);
       colour = texture2D(ramp, vec2(share * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb;
       colour = mix(colour, v_tint * (1.06 - 0.36 * share), tinted);
     }
@@ -71,7 +72,6 @@ export function surfacePaint(): ShaderMaterial {
   return new ShaderMaterial({
     uniforms: {
       ramp: { value: rampTexture(INITIAL.palette) },
-      largest: { value: 1 },
       tinted: { value: 0 },
       clay: { value: CLAY },
     },
@@ -107,7 +107,7 @@ export class Surface {
     private readonly paint: ShaderMaterial,
   ) {
     const count = mesh.geometry.getAttribute("position").count;
-    this.values = new BufferAttribute(new Float32Array(count).fill(-1), 1);
+    this.values = new BufferAttribute(new Float32Array(count), 1);
     this.tints = new BufferAttribute(new Float32Array(3 * count), 3);
     mesh.geometry.setAttribute("value", this.values);
     mesh.geometry.setAttribute("tint", this.tints);
@@ -118,14 +118,14 @@ export class Surface {
   }
 
   /** Colour by values at vertices; vertices without a finite value are grey, with null all are. */
-  setValues(values: ArrayLike<number> | null, largest: number): void {
+  setValues(values: ArrayLike<number> | null, largest: number, least = 0): void {
     const array = this.values.array;
+    const extent = largest - least || 1;
     for (let i = 0; i < array.length; i++) {
-      const value = values ? values[i]! : -1;
-      array[i] = value >= 0 && value < Infinity ? value : -1e9;
+      const share = values ? (values[i]! - least) / extent : Number.NaN;
+      array[i] = Number.isFinite(share) ? Math.min(Math.max(share, -100), 100) : -1e9;
     }
     this.values.needsUpdate = true;
-    this.uniform("largest").value = largest || 1;
   }
 
   /** Light the vertices that have a finite value, and dim all others, until territories are set. */

@@ -3,7 +3,7 @@ import { BufferAttribute, BufferGeometry, Mesh, type ShaderMaterial } from "thre
 import type { Border } from "../api/types";
 import { divide, type Piece } from "../mesh/division";
 import type { LoadedMesh } from "../mesh/loader";
-import { territory } from "./colours";
+import type { Rgb } from "./colours";
 import { IsolineLayer } from "./isolines";
 import { LINES, type Stage } from "./scene";
 import { inFront } from "./surface";
@@ -24,17 +24,27 @@ export class Territories {
   }
 
   /** Show borders on a mesh that is coloured by ``nearest``, the nearest source of each vertex. */
-  show(mesh: LoadedMesh | null, nearest: Int32Array, borders: Border[]): void {
+  show(
+    mesh: LoadedMesh | null,
+    nearest: Int32Array,
+    borders: Border[],
+    colourOf: (source: number) => Rgb,
+  ): void {
     this.lines.show(mesh, borders);
     this.object.geometry.dispose();
-    this.object.geometry = mesh ? divided(mesh, nearest, borders) : new BufferGeometry();
+    this.object.geometry = mesh ? divided(mesh, nearest, borders, colourOf) : new BufferGeometry();
     this.object.visible = mesh !== null && borders.length > 0;
     this.stage.invalidate();
   }
 }
 
 /** Return the faces that borders cross, in parts of one colour each. */
-function divided(mesh: LoadedMesh, nearest: Int32Array, borders: Border[]): BufferGeometry {
+function divided(
+  mesh: LoadedMesh,
+  nearest: Int32Array,
+  borders: Border[],
+  colourOf: (source: number) => Rgb,
+): BufferGeometry {
   const whole = mesh.geometry;
   const [positions, normals, values] = ["position", "normal", "value"].map((name) =>
     whole.getAttribute(name),
@@ -61,7 +71,7 @@ function divided(mesh: LoadedMesh, nearest: Int32Array, borders: Border[]): Buff
         drawn.position.push(at(positions, 0), at(positions, 1), at(positions, 2));
         drawn.normal.push(at(normals, 0), at(normals, 1), at(normals, 2));
         drawn.value.push(at(values, 0));
-        drawn.tint.push(...territory(source));
+        drawn.tint.push(...colourOf(source));
       }
     }
   }
