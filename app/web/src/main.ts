@@ -10,8 +10,9 @@ import { PathProofs } from "./ask/proofs";
 import { Rays } from "./ask/rays";
 import { Routes } from "./ask/routes";
 import { Walks } from "./ask/walks";
-import { byId } from "./dom";
+import { byId, written } from "./dom";
 import { Player } from "./film/player";
+import { positionOf } from "./mesh/picking";
 import { foldOnPhone, isDark, setFolded, setUpAppearance } from "./panel/appearance";
 import { Controls, located } from "./panel/controls";
 import { Cutting } from "./panel/cutting";
@@ -72,7 +73,11 @@ const player = new Player(store, status, sceneView, () => {
   void showWires(store.state);
 });
 const pointer = new Pointer(sceneView, store, () => controls.tool);
-pointer.onHover = (point) => fields.tell(point, store.state);
+pointer.onHover = (point) => {
+  fields.tell(point, store.state);
+  tellWhere(sceneView.mesh && point && positionOf(sceneView.mesh, point));
+};
+isolines.onDraw = () => sceneView.showLevels(store.state);
 listenToKeys(store, status, sceneView, pointer);
 drawRamp(store.state.palette);
 exportPanel.largest = () => fields.of(store.state)?.largest ?? 0;
@@ -123,6 +128,8 @@ store.listen((state, before) => {
   if (state.palette !== before.palette) showPalette(state);
   if (state.lines !== before.lines) isolines.follow(state);
   if (state.polar !== before.polar) rays.follow(state);
+  if (state.labels !== before.labels) sceneView.showLevels(state);
+  if (state.flat !== before.flat || state.section !== before.section) sceneView.showLook(state);
   if (state.wireframe !== before.wireframe) void showWires(state);
   if (sceneView.mesh) sceneView.showPoints(state);
   if (state.barriers !== before.barriers || state.isReadable !== before.isReadable)
@@ -141,6 +148,13 @@ function makeRoom(): void {
 function nameUnit(state: State): void {
   fields.paint(state);
   if (report) showReport(report, sceneView, unitOf(state), meshes.joiningOf(report.id));
+}
+
+/** Tell the coordinates of the position under the pointer; null: none. */
+function tellWhere(position: readonly number[] | null): void {
+  byId("where").hidden = position === null;
+  const named = position?.map((x, axis) => `${"xyz"[axis]} ${written(x, 4)}`);
+  byId("where").textContent = named?.join("  ") ?? "";
 }
 
 function showProfile(outline: Outline | null): void {
@@ -193,6 +207,7 @@ function open(mesh: string): void {
     walks.draw();
     boundaries.follow(now);
     showPalette(now);
+    sceneView.showLook(now);
     await showWires(now);
   });
 }

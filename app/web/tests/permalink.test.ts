@@ -38,7 +38,10 @@ function randomState(random: Random): State {
     palette: random.pick(PALETTES),
     least: random.pick([null, -random.size()]),
     range: random.pick([null, random.size()]),
+    labels: random.pick([true, false]),
     wireframe: random.pick([true, false]),
+    flat: random.pick([true, false]),
+    section: random.pick([null, { axis: "y", share: 0.25 }] as const),
     up: random.pick(view ? (["y", "z"] as const) : ([null, "y", "z"] as const)),
     view,
   };

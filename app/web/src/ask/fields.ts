@@ -193,8 +193,10 @@ export class Fields {
       surface.setTerritories(nearest.map((source) => hues[source] ?? source));
       this.sceneView.showPoints(state);
       this.showTerritories(state);
-    } else
-      showScale(`${hasCost(state) ? "Cost" : "Distance"} in ${measureOf(state)}`, largest, least);
+    } else {
+      const what = hasCost(state) ? "Cost" : method === "fast" ? "Rough distance" : "Distance";
+      showScale(`${what} in ${measureOf(state)}`, largest, least);
+    }
   }
 
   private showTerritories(state: State): void {

@@ -12,6 +12,8 @@ import { boundInWords, type Fields, questionOf, shadeOf } from "./fields";
 
 export class Isolines {
   private readonly drawing: Drawing;
+  /** Called when lines are drawn, or none any more. */
+  onDraw: () => void = () => undefined;
 
   constructor(
     status: Status,
@@ -19,7 +21,10 @@ export class Isolines {
     private readonly fields: Fields,
     private readonly notes: Notes,
   ) {
-    this.drawing = new Drawing(status, notes, "isolines", () => sceneView.showIsolines([]));
+    this.drawing = new Drawing(status, notes, "isolines", () => {
+      sceneView.showIsolines([]);
+      this.onDraw();
+    });
   }
 
   /** Request the isolines that `state` needs and that are not drawn yet, and draw them. */
@@ -45,6 +50,7 @@ export class Isolines {
       const isOfOtherMethod = !hasCost(state) && answer.method !== state.method;
       return () => {
         this.sceneView.showIsolines(answer.isolines);
+        this.onDraw();
         this.notes.tell("isolines", [
           ...(isOfOtherMethod ? [`Isolines: ${boundInWords(answer.error_bound)}.`] : []),
           ...answer.warnings,
@@ -64,6 +70,7 @@ export class Isolines {
       const { isolines, warnings } = await askLevelSets(mesh, question, { onProgress, signal });
       return () => {
         this.sceneView.showIsolines(isolines);
+        this.onDraw();
         this.notes.tell("isolines", warnings);
       };
     });

@@ -6,6 +6,7 @@ import { askCheapest, type SurfaceCost } from "../api/tools";
 import type { Outline, Point, Step } from "../api/types";
 import { byId, count, written } from "../dom";
 import { InputError } from "../inputError";
+import { differences } from "../mesh/frame";
 import type { Notes } from "../panel/notes";
 import { endOf, nameOf, startsOf, stopsOf } from "../state/places";
 import { writePoint } from "../state/point";
@@ -148,7 +149,7 @@ export class Routes {
     const bound = outline.method === "exact" ? "exact" : boundInWords(outline.error_bound);
     const words =
       outline.cost == null
-        ? `${unit}, ${bound}`
+        ? `${unit}, ${bound}; ${written(straight(outline), 6)} straight`
         : `${this.measure}, ${bound}; ${written(outline.length ?? 0, 6)} ${unit} long`;
     byId("length-note").textContent = outline.length == null ? reason(outline) : words;
     byId("length-names").textContent = this.names.join(" → ");
@@ -194,6 +195,12 @@ export class Routes {
     byId("explain-start").hidden = false;
     this.sceneView.region.show(null, []);
   }
+}
+
+/** Return how far the ends of a path are apart in space. */
+function straight({ points }: Outline): number {
+  const [first, last] = [points?.at(0), points?.at(-1)];
+  return first && last ? Math.hypot(...differences(last, first)) : 0;
 }
 
 /** Return the cheapest path from the source from where it is cheapest. */

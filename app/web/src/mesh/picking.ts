@@ -7,6 +7,9 @@ import type { LoadedMesh } from "./loader";
 /** What is no farther in front of a position, in radii of the mesh, does not hide it. */
 const CLOSE = 0.01;
 
+/** Whether a drawn position is beyond the section. */
+export type IsHidden = (position: Vector3) => boolean;
+
 export type FacePoint = Extract<Point, { face: number }>;
 
 /** Return the point of the surface under ``x``, ``y`` (-1 to 1, y upwards), or null where there is none. */
@@ -16,10 +19,11 @@ export function pick(
   camera: Camera,
   x: number,
   y: number,
+  isHidden: IsHidden,
 ): FacePoint | null {
   const origin = new Vector3().setFromMatrixPosition(camera.matrixWorld);
   const direction = new Vector3(x, y, 0.5).unproject(camera).sub(origin).normalize();
-  const hit = tree.raycastFirst(new Ray(origin, direction), DoubleSide);
+  const hit = firstHit(tree, new Ray(origin, direction), isHidden);
   if (hit?.faceIndex == null) return null;
   const [a, b, c] = mesh
     .corners(hit.faceIndex)
@@ -28,11 +32,24 @@ export function pick(
 }
 
 /** Whether nothing of the surface is between the camera and a drawn position of it. */
-export function isSeen(tree: MeshBVH, camera: Camera, position: readonly number[]): boolean {
+export function isSeen(
+  tree: MeshBVH,
+  camera: Camera,
+  position: readonly number[],
+  isHidden: IsHidden,
+): boolean {
   const origin = new Vector3().setFromMatrixPosition(camera.matrixWorld);
   const way = new Vector3(...position).sub(origin);
-  const hit = tree.raycastFirst(new Ray(origin, way.clone().normalize()), DoubleSide);
+  const hit = firstHit(tree, new Ray(origin, way.clone().normalize()), isHidden);
   return hit === null || hit.distance > way.length() - CLOSE;
+}
+
+/** Return the first place on a ray where the surface is not hidden by a section, or null. */
+function firstHit(tree: MeshBVH, ray: Ray, isHidden: IsHidden) {
+  const first = tree.raycastFirst(ray, DoubleSide);
+  if (!first || !isHidden(first.point)) return first;
+  const seen = tree.raycast(ray, DoubleSide).filter(({ point }) => !isHidden(point));
+  return seen.sort((a, b) => a.distance - b.distance)[0] ?? null;
 }
 
 /** Return the barycentric weights of a point, none below 0, with sum 1. */

@@ -26,6 +26,13 @@ import type { Notes } from "./notes";
 /** Positions that are this many edges from the surface, at most, are on it: they were rounded. */
 const FAR = 0.1;
 
+/** Azimuth and polar angle of the usual views. */
+const LOOKS = [
+  ["front", 0, Math.PI / 2],
+  ["top", 0, 0.001],
+  ["iso", Math.PI / 4, Math.acos(1 / Math.sqrt(3))],
+] as const;
+
 type Question = Pick<WrittenState, "places" | "starts" | "walk" | "barriers" | "maxDistance">;
 
 export class Controls {
@@ -93,6 +100,27 @@ export class Controls {
     byId("wireframe").addEventListener("change", () =>
       store.update({ wireframe: byId("wireframe", HTMLInputElement).checked }),
     );
+    byId("flat").addEventListener("change", () =>
+      store.update({ flat: byId("flat", HTMLInputElement).checked }),
+    );
+    byId("label-lines").addEventListener("change", () =>
+      store.update({ labels: byId("label-lines", HTMLInputElement).checked }),
+    );
+    const [section, share] = [
+      byId("section", HTMLSelectElement),
+      byId("section-share", HTMLInputElement),
+    ];
+    const sectionNow = (): State["section"] => {
+      const axis = (["x", "y", "z"] as const).find((each) => each === section.value);
+      return axis ? { axis, share: share.valueAsNumber } : null;
+    };
+    section.addEventListener("change", () => store.update({ section: sectionNow() }));
+    share.addEventListener("input", () =>
+      sceneView.showLook({ ...store.state, section: sectionNow() }),
+    );
+    share.addEventListener("change", () => store.update({ section: sectionNow() }));
+    for (const [id, theta, phi] of LOOKS)
+      byId(`look-${id}`).addEventListener("click", () => sceneView.stage.lookFrom(theta, phi));
     byId("fit").addEventListener("click", () => {
       sceneView.stage.lookAtAll();
       store.replace({ view: null });
@@ -150,6 +178,11 @@ export class Controls {
     setValue("least", state.least === null ? "" : String(state.least));
     setValue("range", state.range === null ? "" : String(state.range));
     byId("wireframe", HTMLInputElement).checked = state.wireframe;
+    byId("flat", HTMLInputElement).checked = state.flat;
+    byId("label-lines", HTMLInputElement).checked = state.labels;
+    byId("section", HTMLSelectElement).value = state.section?.axis ?? "";
+    byId("section-share").hidden = state.section === null;
+    setValue("section-share", String(state.section?.share ?? 0.5));
   }
 
   /** Show the question; what cannot be read stays as it was typed. */

@@ -153,6 +153,7 @@ export class Pointer {
   private click(spot: Spot, modifiers: Modifiers): void {
     const point = this.at(spot);
     if (!point) {
+      if (spot instanceof PointerEvent && this.sceneView.stage.clickAxes(spot)) return;
       if (this.sceneView.isPickable) this.cue.tell("That is beside the mesh", spot);
       return;
     }

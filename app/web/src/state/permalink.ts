@@ -10,6 +10,7 @@ import {
   PALETTES,
   type Palette,
   RULES,
+  type Section,
   type Shade,
   type Slope,
   type State,
@@ -57,7 +58,10 @@ export function writeState(state: State): string {
   if (state.palette !== INITIAL.palette) query.set("palette", state.palette);
   if (state.least !== null) query.set("least", String(state.least));
   if (state.range !== null) query.set("range", String(state.range));
+  if (state.labels) query.set("labels", "1");
   if (state.wireframe) query.set("wireframe", "1");
+  if (state.flat) query.set("flat", "1");
+  if (state.section) query.set("section", `${state.section.axis}:${state.section.share}`);
   if (state.up) query.set("up", state.up);
   if (state.view) query.set("view", state.view.map((x) => Number(x.toFixed(4))).join(","));
   // Points are easier to read without escapes, which none of these needs in a query.
@@ -110,7 +114,10 @@ export function readState(search: string): WrittenState {
     palette: oneOf<Palette>(query.get("palette"), PALETTES),
     least: finite(query.get("least")),
     range: finite(query.get("range")),
+    labels: query.get("labels") === "1",
     wireframe: query.get("wireframe") === "1",
+    flat: query.get("flat") === "1",
+    section: readSection(query.get("section")),
     // A view without an axis was written when y was always up.
     up: UPS.find((up) => up === query.get("up")) ?? (view && "y"),
     view,
@@ -146,6 +153,12 @@ function readSlope(text: string | null): Slope | null {
   const rule = RULES.find((each) => each === name);
   const up = UPS.find((each) => each === axis);
   return rule && up ? { rule, up } : null;
+}
+
+function readSection(text: string | null): Section | null {
+  const [, axis, share] = /^([xyz]):([\d.]+)$/.exec(text ?? "") ?? [];
+  const isWithin = axis && Number(share) <= 1;
+  return isWithin ? { axis: axis as Section["axis"], share: Number(share) } : null;
 }
 
 /** Read a vector: x, y, z; nothing is none. */

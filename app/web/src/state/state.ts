@@ -21,6 +21,12 @@ export interface Values {
   key: number;
 }
 
+/** A plane that hides what is beyond: the axis that it is normal to, and the share of the extent. */
+export interface Section {
+  axis: "x" | "y" | "z";
+  share: number;
+}
+
 export interface State {
   mesh: string | null;
   /** The starts, then the stops of the path, then its end. */
@@ -57,7 +63,12 @@ export interface State {
   /** The values of the first and the last colour; null: the least and the largest. */
   least: number | null;
   range: number | null;
+  /** Whether isolines are labelled by their levels. */
+  labels: boolean;
   wireframe: boolean;
+  /** Whether colours are shown as they are, without light. */
+  flat: boolean;
+  section: Section | null;
   /** The axis that points upwards; null: as guessed. */
   up: Up | null;
   /** Azimuth, polar angle, distance and target of the camera, as drawn; null: the whole mesh. */
@@ -88,7 +99,10 @@ export const INITIAL: State = {
   palette: "teal",
   least: null,
   range: null,
+  labels: false,
   wireframe: false,
+  flat: false,
+  section: null,
   up: null,
   view: null,
 };
@@ -198,6 +212,7 @@ export function withMesh(mesh: string, { lines }: State): Partial<State> {
     values: null,
     least: null,
     range: null,
+    section: null,
     lines: lines && "spacing" in lines ? INITIAL.lines : lines,
     up: null,
     view: null,

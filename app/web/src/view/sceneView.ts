@@ -2,11 +2,12 @@
 import { Mesh, PlaneGeometry, Vector3 } from "three";
 import type { MeshBVH } from "three-mesh-bvh";
 import type { Border, IsolinesAnswer, Line, MeshDocument, Outline } from "../api/types";
+import { written } from "../dom";
 import { frontOf, type Up } from "../mesh/frame";
 import { type LoadedMesh, loadMesh } from "../mesh/loader";
-import { type FacePoint, isSeen, pick, positionOf } from "../mesh/picking";
+import { type FacePoint, type IsHidden, isSeen, pick, positionOf } from "../mesh/picking";
 import { nameOf } from "../state/places";
-import type { State } from "../state/state";
+import type { Section, State } from "../state/state";
 import { type Rgb, territory } from "./colours";
 import { IsolineLayer } from "./isolines";
 import { Labels } from "./labels";
@@ -39,6 +40,7 @@ export class SceneView {
   hues: number[] = [];
   private readonly paint = surfacePaint();
   private tree: MeshBVH | null = null;
+  private isHidden: IsHidden = () => false;
   private readonly points: Markers;
   private readonly faultPoints: Markers;
   private readonly isolines: IsolineLayer;
@@ -50,6 +52,8 @@ export class SceneView {
   private readonly walkEnd: Markers;
   private readonly territories: Territories;
   private readonly labels: Labels;
+  private readonly levels: Labels;
+  private shownLevels: IsolinesAnswer["isolines"] = [];
 
   constructor(readonly stage: Stage) {
     this.barriers = new Patch(stage, 0x15181f, 0.82);
@@ -66,10 +70,13 @@ export class SceneView {
     this.faultPoints = new Markers(stage);
     this.spot = new Markers(stage);
     this.warmUp();
-    this.labels = new Labels(stage, (position) => this.isSeen(position));
+    const isSeenNow = (position: Triple): boolean => this.isSeen(position);
+    this.labels = new Labels(stage, "point-labels", isSeenNow);
+    this.levels = new Labels(stage, "level-labels", isSeenNow);
     stage.onFrame = () => {
       showScaleBar(stage, this.mesh?.frame.radius ?? null);
       this.labels.follow();
+      this.levels.follow();
     };
   }
 
@@ -82,6 +89,8 @@ export class SceneView {
     const { array: normals } = mesh.geometry.getAttribute("normal");
     this.stage.shape = positions;
     this.stage.front.set(...frontOf(positions, normals));
+    this.stage.compass.isShown = true;
+    this.stage.compass.name(mesh.frame.up);
     this.stage.add(this.surface.object);
     await this.stage.drawn();
     this.tree = await mesh.tree;
@@ -111,6 +120,9 @@ export class SceneView {
     for (const patch of [this.barriers, this.region, this.faults]) patch.show(null, []);
     this.points.show([]);
     this.labels.show([]);
+    this.shownLevels = [];
+    this.levels.show([]);
+    this.stage.compass.isShown = false;
     this.faultPoints.show([]);
     this.isolines.show(null, []);
     this.rays.show(null, []);
@@ -127,12 +139,24 @@ export class SceneView {
 
   /** Return the point of the surface under a place of the canvas, or null where there is none. */
   pick(x: number, y: number): FacePoint | null {
-    return this.mesh && this.tree ? pick(this.mesh, this.tree, this.stage.camera, x, y) : null;
+    const { mesh, tree } = this;
+    return mesh && tree ? pick(mesh, tree, this.stage.camera, x, y, this.isHidden) : null;
   }
 
   /** Whether a drawn position of the surface is not hidden by it. */
   isSeen(position: Triple): boolean {
-    return !this.tree || isSeen(this.tree, this.stage.camera, position);
+    return !this.tree || isSeen(this.tree, this.stage.camera, position, this.isHidden);
+  }
+
+  /** Show the surface in a light or flat, and only what a section leaves of it. */
+  showLook({ flat, section }: Pick<State, "flat" | "section">): void {
+    const { mesh, surface } = this;
+    if (!mesh || !surface) return;
+    surface.setLit(!flat);
+    const [normal, out] = section ? planeOf(mesh, section) : [new Vector3(), 1];
+    surface.setSection(normal.toArray(), out);
+    this.isHidden = section ? (position) => normal.dot(position) > out : () => false;
+    this.stage.invalidate();
   }
 
   /** Show the whole mesh, from where the points can be seen if there are any. */
@@ -208,12 +232,26 @@ export class SceneView {
     );
   }
 
+  /** Label each level in the middle of its longest line, or none. */
+  showLevels({ labels }: Pick<State, "labels">): void {
+    const { mesh } = this;
+    const shown = this.shownLevels.flatMap(({ level, lines }) => {
+      const [longest] = lines.toSorted((a, b) => b.length - a.length);
+      const points = longest?.points ?? [];
+      const middle = points[Math.floor(points.length / 2)];
+      return mesh && middle ? { position: mesh.drawn(middle), name: written(level, 3) } : [];
+    });
+    this.levels.show(labels ? shown : []);
+    this.stage.invalidateOverlay();
+  }
+
   /** Return the colour of the territory of a source. */
   colourOf(source: number): Rgb {
     return territory(this.hues[source] ?? source);
   }
 
   showIsolines(levels: IsolinesAnswer["isolines"]): void {
+    this.shownLevels = levels;
     this.isolines.show(
       this.mesh,
       levels.flatMap(({ lines }) => lines),
@@ -234,4 +272,18 @@ export class SceneView {
     }));
     this.faultPoints.show(marks);
   }
+}
+
+/** Return the normal of a section in drawn positions, and how far out it is. */
+function planeOf(mesh: LoadedMesh, { axis, share }: Section): [Vector3, number] {
+  const [low, high] = mesh.document.bounds ?? [
+    [0, 0, 0],
+    [0, 0, 0],
+  ];
+  const at = "xyz".indexOf(axis);
+  const ends = [low, high].map((corner) => new Vector3(...mesh.drawn(corner)));
+  const [from = new Vector3(), to = new Vector3()] = ends;
+  const along = low.map((x, i) => (i === at ? (high[i] ?? x) : x));
+  const normal = new Vector3(...mesh.drawn(along)).sub(from).normalize();
+  return [normal, from.dot(normal) + share * to.sub(from).dot(normal)];
 }

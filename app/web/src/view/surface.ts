@@ -11,7 +11,9 @@ import {
   Mesh,
   RGBAFormat,
   ShaderMaterial,
+  Vector4,
 } from "three";
+import type { Triple } from "../mesh/frame";
 import type { LoadedMesh } from "../mesh/loader";
 import { INITIAL, type Palette } from "../state/state";
 import { type Rgb, ramp, territory } from "./colours";
@@ -23,7 +25,9 @@ const VERTEX = /* glsl */ `
   varying vec3 v_tint;
   varying vec3 v_normal;
   varying vec3 v_eye;
+  varying vec3 v_place;
   void main() {
+    v_place = position;
     v_value = value;
     v_tint = tint;
     v_normal = normalMatrix * normal;
@@ -43,7 +47,11 @@ const FRAGMENT = /* glsl */ `
   varying vec3 v_tint;
   varying vec3 v_normal;
   varying vec3 v_eye;
+  varying vec3 v_place;
+  uniform vec4 section;
+  uniform float lit;
   void main() {
+    if (dot(v_place, section.xyz) > section.w) discard;
     vec3 colour = clay;
     if (v_value > UNREACHED) {
       float share = clamp(v_value, 0.0, 1.0);
@@ -57,8 +65,8 @@ const FRAGMENT = /* glsl */ `
     float sky = 0.5 + 0.5 * normal.y;
     float gloss = pow(max(dot(normal, normalize(eye + vec3(0.35, 0.6, 0.9))), 0.0), 48.0);
     float edge = pow(1.0 - max(dot(normal, eye), 0.0), 4.0);
-    colour *= 0.50 + 0.14 * sky + 0.44 * key;
-    colour += 0.10 * gloss + 0.06 * edge;
+    colour *= mix(1.0, 0.50 + 0.14 * sky + 0.44 * key, lit);
+    colour += lit * (0.10 * gloss + 0.06 * edge);
     gl_FragColor = vec4(colour, 1.0);
   }`;
 
@@ -74,6 +82,8 @@ export function surfacePaint(): ShaderMaterial {
       ramp: { value: rampTexture(INITIAL.palette) },
       tinted: { value: 0 },
       clay: { value: CLAY },
+      lit: { value: 1 },
+      section: { value: new Vector4(0, 0, 0, 1) },
     },
     vertexShader: VERTEX,
     fragmentShader: FRAGMENT,
@@ -147,6 +157,16 @@ export class Surface {
       if (nearest[i]! >= 0) array.set(territory(nearest[i]!), 3 * i);
     }
     this.tints.needsUpdate = true;
+  }
+
+  /** Show colours in a light, or as they are. */
+  setLit(isLit: boolean): void {
+    this.uniform("lit").value = isLit ? 1 : 0;
+  }
+
+  /** Hide what is beyond a plane of drawn positions, given by its normal and how far it is out. */
+  setSection([x, y, z]: Triple, out: number): void {
+    (this.uniform("section").value as Vector4).set(x, y, z, out);
   }
 
   setPalette(palette: Palette): void {
