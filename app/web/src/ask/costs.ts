@@ -24,6 +24,6 @@ export function costKey({ slope, tolls }: State): unknown {
 
 /** Return in what distances or costs are counted. */
 export function measureOf(state: State): string {
-  if (state.tolls) return state.slope ? "seconds × cost of faces" : "cost";
-  return state.slope ? "seconds, if units are metres" : unitOf(state);
+  if (state.slope) return "s";
+  return state.tolls ? "units of the faces" : unitOf(state);
 }

@@ -211,7 +211,7 @@ export class Fields {
           colour: this.sceneView.colourOf(i),
         };
       }),
-      unitOf(state),
+      state.unit && ` in ${state.unit}²`,
     );
   }
 

@@ -2,6 +2,7 @@
 import { authorization, post } from "../api/http";
 import type { About, Point } from "../api/types";
 import { bordersOf } from "../ask/borders";
+import { costOf } from "../ask/costs";
 import { questionOf } from "../ask/fields";
 import { isolinesOf } from "../ask/isolines";
 import { button, byId, download } from "../dom";
@@ -98,7 +99,9 @@ export class ExportPanel {
     const { state } = this.store;
     const { barriers, lines } = state;
     const [target, waypoints] = [endOf(state), stopsOf(state)];
-    if (what === "path") return { source: this.source(), target, waypoints, barriers };
+    const cost = costOf(state);
+    const path = { source: this.source(), target, waypoints, barriers };
+    if (what === "path") return cost ? { ...path, cost } : path;
     if (what === "borders") return bordersOf(state);
     if (what === "distances" || lines === null) return questionOf(state, state.method);
     return isolinesOf(state, lines, this.largest());

@@ -1,5 +1,6 @@
 // The current query as a curl command and as a Python program.
 import type { Point } from "../api/types";
+import { costOf } from "../ask/costs";
 import { questionOf } from "../ask/fields";
 import { endOf, stopsOf } from "../state/places";
 import type { State } from "../state/state";
@@ -15,7 +16,9 @@ function queryOf(state: State, source: Point): Query {
   const [target, waypoints] = [endOf(state), stopsOf(state)];
   const mesh = `v1/meshes/${state.mesh}`;
   if (!target) return { path: `${mesh}/distances`, body: questionOf(state, state.method) };
+  const cost = costOf(state);
   const more = {
+    ...(cost && { cost }),
     ...(waypoints.length > 0 && { waypoints }),
     ...(barriers.length > 0 && { barriers }),
   };

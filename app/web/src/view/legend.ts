@@ -51,16 +51,14 @@ export function showScale(title: string, largest: number, least = 0): void {
   }
 }
 
-/** Show the colour of each territory, and its area where it is known, in squares of a unit. */
+/** Show the colour of each territory, and its area where it is known. */
 export function showTerritories(
   territories: { name: string; area: string; colour: Rgb }[],
   unit: string,
 ): void {
   byId("legend").hidden = false;
   const isMeasured = territories.some(({ area }) => area);
-  byId("legend-title").textContent = isMeasured
-    ? `Nearest start; area in ${unit}²`
-    : "Nearest start";
+  byId("legend-title").textContent = isMeasured ? `Nearest start, area${unit}` : "Nearest start";
   byId("scale").hidden = true;
   byId("territories").replaceChildren(
     ...territories.map(({ name, area, colour }) => {
