@@ -93,7 +93,7 @@ def test_each_story_opens_with_its_answer(view: View) -> None:
             assert view.page.locator("#territories li").count() == starts > 1, title
         assert not view.page.is_visible("#stories ul"), "what is not used is folded"
         view.unfold("stories")
-    assert i == 3
+    assert i == 4
 
 
 def test_the_axis_upwards_is_guessed_and_can_be_chosen(view: View, service: str) -> None:

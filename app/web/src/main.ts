@@ -1,6 +1,7 @@
 // The page's parts and their wiring: users change the state, and every part follows it.
 import { getMesh, makeSample } from "./api/meshes";
 import { getAbout } from "./api/queries";
+import { askLogMap } from "./api/tools";
 import type { About, MeshDocument, Outline } from "./api/types";
 import { Borders } from "./ask/borders";
 import { Boundaries } from "./ask/boundaries";
@@ -109,7 +110,11 @@ const stories = byId("stories", HTMLDetailsElement);
 let report: MeshDocument | null = null;
 
 store.listen((state, before) => {
-  if (state.mesh !== null && (state.mesh !== before.mesh || isTurned(state))) open(state.mesh);
+  if (
+    state.mesh !== null &&
+    (state.mesh !== before.mesh || isTurned(state) || isUnrolled(state, before))
+  )
+    open(state.mesh);
   if (state.mesh !== before.mesh || pointer.wasExample(before)) makeRoom();
   if (state.places !== before.places) notes.tell("points", []);
   controls.show(state);
@@ -173,6 +178,19 @@ function isTurned({ up }: State): boolean {
   return drawn !== undefined && up !== null && up !== drawn;
 }
 
+/** Whether the surface is to be unrolled, or rolled up, otherwise than before. */
+function isUnrolled(state: State, before: State): boolean {
+  const asked = (each: State): string => JSON.stringify(each.unroll && unrollingOf(each));
+  return asked(state) !== asked(before);
+}
+
+function unrollingOf({ places, barriers, maxDistance }: State) {
+  const [first] = places;
+  if (!first) return null;
+  const limit = maxDistance === null ? {} : { max_distance: maxDistance };
+  return { source: first.point, barriers, ...limit };
+}
+
 /** Load a mesh, and draw on it the answers that have arrived by then. */
 function open(mesh: string): void {
   opening.abort();
@@ -188,10 +206,16 @@ function open(mesh: string): void {
   showReport(report, sceneView, "", null);
   const stop = new AbortController();
   opening = stop;
-  status.run("loading", "Loading the mesh…", stop, async () => {
+  status.run("loading", "Loading the mesh…", stop, async (onProgress) => {
     const document = await getMesh(mesh);
     await sceneView.open(document, store.state.up, stop.signal);
     stop.signal.throwIfAborted();
+    const unrolling = store.state.unroll ? unrollingOf(store.state) : null;
+    if (unrolling) {
+      const logMap = await askLogMap(mesh, unrolling, { onProgress, signal: stop.signal });
+      stop.signal.throwIfAborted();
+      sceneView.unroll(logMap);
+    }
     controls.showUp(sceneView.mesh?.frame.up ?? "y");
     const now = store.state;
     if (now.view) stage.look(now.view);

@@ -41,6 +41,7 @@ function randomState(random: Random): State {
     labels: random.pick([true, false]),
     wireframe: random.pick([true, false]),
     flat: random.pick([true, false]),
+    unroll: random.pick([true, false]),
     section: random.pick([null, { axis: "y", share: 0.25 }] as const),
     up: random.pick(view ? (["y", "z"] as const) : ([null, "y", "z"] as const)),
     view,

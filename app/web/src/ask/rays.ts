@@ -59,7 +59,10 @@ export class Rays {
       );
       return () =>
         this.sceneView.showRays(
-          traced.map(({ points }, i) => ({ points: points?.slice(0, counts[i]) ?? [] })),
+          traced.map(({ points, faces }, i) => ({
+            points: points?.slice(0, counts[i]) ?? [],
+            faces,
+          })),
         );
     });
   }

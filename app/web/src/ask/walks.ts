@@ -65,7 +65,7 @@ export class Walks {
 
   /** Draw the line that was found; a mesh that was just loaded shows none yet. */
   draw(): void {
-    this.sceneView.showWalk(this.line?.points ?? []);
+    this.sceneView.showWalk(this.line);
   }
 
   private async answer(request: WalkRequest, signal: AbortSignal): Promise<void> {

@@ -25,9 +25,7 @@ export function pick(
   const direction = new Vector3(x, y, 0.5).unproject(camera).sub(origin).normalize();
   const hit = firstHit(tree, new Ray(origin, direction), isHidden);
   if (hit?.faceIndex == null) return null;
-  const [a, b, c] = mesh
-    .corners(hit.faceIndex)
-    .map((v) => new Vector3(...mesh.drawn(mesh.vertex(v))));
+  const [a, b, c] = mesh.corners(hit.faceIndex).map((v) => new Vector3(...mesh.drawnVertex(v)));
   return { face: hit.faceIndex, barycentric: weights(a!, b!, c!, hit.point) };
 }
 
@@ -65,12 +63,25 @@ function weights(a: Vector3, b: Vector3, c: Vector3, point: Vector3): [number, n
 
 /** Return the position of a point, in mesh units. */
 export function positionOf(mesh: LoadedMesh, point: Point): [number, number, number] {
-  if ("vertex" in point) return mesh.vertex(point.vertex);
+  return between(mesh, point, (vertex) => mesh.vertex(vertex));
+}
+
+/** Return where a point is drawn. */
+export function drawnAt(mesh: LoadedMesh, point: Point): [number, number, number] {
+  return between(mesh, point, (vertex) => mesh.drawnVertex(vertex));
+}
+
+function between(
+  mesh: LoadedMesh,
+  point: Point,
+  place: (vertex: number) => [number, number, number],
+): [number, number, number] {
+  if ("vertex" in point) return place(point.vertex);
   const [vertices, shares] =
     "edge" in point
       ? [point.edge, [1 - point.t, point.t]]
       : [mesh.corners(point.face), point.barycentric];
-  const corners = vertices.map((vertex) => mesh.vertex(vertex));
+  const corners = vertices.map(place);
   return [0, 1, 2].map((axis) =>
     corners.reduce((sum, corner, i) => sum + shares[i]! * corner[axis]!, 0),
   ) as [number, number, number];

@@ -100,6 +100,9 @@ export class Controls {
     byId("wireframe").addEventListener("change", () =>
       store.update({ wireframe: byId("wireframe", HTMLInputElement).checked }),
     );
+    byId("unroll").addEventListener("change", () =>
+      store.update({ unroll: byId("unroll", HTMLInputElement).checked, view: null, section: null }),
+    );
     byId("flat").addEventListener("change", () =>
       store.update({ flat: byId("flat", HTMLInputElement).checked }),
     );
@@ -179,6 +182,7 @@ export class Controls {
     setValue("range", state.range === null ? "" : String(state.range));
     byId("wireframe", HTMLInputElement).checked = state.wireframe;
     byId("flat", HTMLInputElement).checked = state.flat;
+    byId("unroll", HTMLInputElement).checked = state.unroll;
     byId("label-lines", HTMLInputElement).checked = state.labels;
     byId("section", HTMLSelectElement).value = state.section?.axis ?? "";
     byId("section-share").hidden = state.section === null;

@@ -61,6 +61,7 @@ export function writeState(state: State): string {
   if (state.labels) query.set("labels", "1");
   if (state.wireframe) query.set("wireframe", "1");
   if (state.flat) query.set("flat", "1");
+  if (state.unroll) query.set("unroll", "1");
   if (state.section) query.set("section", `${state.section.axis}:${state.section.share}`);
   if (state.up) query.set("up", state.up);
   if (state.view) query.set("view", state.view.map((x) => Number(x.toFixed(4))).join(","));
@@ -117,6 +118,7 @@ export function readState(search: string): WrittenState {
     labels: query.get("labels") === "1",
     wireframe: query.get("wireframe") === "1",
     flat: query.get("flat") === "1",
+    unroll: query.get("unroll") === "1",
     section: readSection(query.get("section")),
     // A view without an axis was written when y was always up.
     up: UPS.find((up) => up === query.get("up")) ?? (view && "y"),

@@ -69,6 +69,8 @@ export interface State {
   /** Whether colours are shown as they are, without light. */
   flat: boolean;
   section: Section | null;
+  /** Whether the surface is unrolled around the first start. */
+  unroll: boolean;
   /** The axis that points upwards; null: as guessed. */
   up: Up | null;
   /** Azimuth, polar angle, distance and target of the camera, as drawn; null: the whole mesh. */
@@ -103,6 +105,7 @@ export const INITIAL: State = {
   wireframe: false,
   flat: false,
   section: null,
+  unroll: false,
   up: null,
   view: null,
 };
@@ -213,6 +216,7 @@ export function withMesh(mesh: string, { lines }: State): Partial<State> {
     least: null,
     range: null,
     section: null,
+    unroll: false,
     lines: lines && "spacing" in lines ? INITIAL.lines : lines,
     up: null,
     view: null,

@@ -28,19 +28,19 @@ export class IsolineLayer {
   }
 
   /** Show lines on a mesh, in place of the ones before. A closed line does not repeat its start. */
-  show(mesh: Pick<LoadedMesh, "drawn"> | null, lines: Pick<Line, "points" | "closed">[]): void {
+  show(
+    mesh: Pick<LoadedMesh, "drawnLines"> | null,
+    lines: Pick<Line, "points" | "closed" | "faces">[],
+  ): void {
     const isShown = mesh !== null && lines.length > 0;
     if (!isShown && !this.object.visible) return;
     this.object.visible = isShown;
     this.object.geometry.dispose();
     this.object.geometry = isShown
       ? ribbons(
-          lines.map((line) => {
-            const points = line.points ?? [];
-            return (line.closed ? [...points, points[0]!] : points).map((point) =>
-              mesh.drawn(point),
-            );
-          }),
+          lines.flatMap(({ points, faces, closed }) =>
+            mesh.drawnLines(points ?? [], faces, closed),
+          ),
         )
       : new BufferGeometry();
     this.stage.invalidate();

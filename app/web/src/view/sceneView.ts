@@ -1,11 +1,19 @@
 // The mesh on the stage, with points, path, barriers and faults on it.
 import { Mesh, PlaneGeometry, Vector3 } from "three";
-import type { MeshBVH } from "three-mesh-bvh";
-import type { Border, IsolinesAnswer, Line, MeshDocument, Outline } from "../api/types";
+import { MeshBVH } from "three-mesh-bvh";
+import type {
+  Border,
+  IsolinesAnswer,
+  Line,
+  MeshDocument,
+  Outline,
+  StraightLine,
+} from "../api/types";
 import { written } from "../dom";
 import { frontOf, type Up } from "../mesh/frame";
 import { type LoadedMesh, loadMesh } from "../mesh/loader";
-import { type FacePoint, type IsHidden, isSeen, pick, positionOf } from "../mesh/picking";
+import { drawnAt, type FacePoint, type IsHidden, isSeen, pick } from "../mesh/picking";
+import { Plane } from "../mesh/plane";
 import { nameOf } from "../state/places";
 import type { Section, State } from "../state/state";
 import { type Rgb, territory } from "./colours";
@@ -74,7 +82,7 @@ export class SceneView {
     this.labels = new Labels(stage, "point-labels", isSeenNow);
     this.levels = new Labels(stage, "level-labels", isSeenNow);
     stage.onFrame = () => {
-      showScaleBar(stage, this.mesh?.frame.radius ?? null);
+      showScaleBar(stage, (this.mesh?.plane ?? this.mesh?.frame)?.radius ?? null);
       this.labels.follow();
       this.levels.follow();
     };
@@ -96,6 +104,18 @@ export class SceneView {
     this.tree = await mesh.tree;
   }
 
+  /** Unroll the surface into the plane of a log map. */
+  unroll(logMap: Float64Array): void {
+    const { mesh, surface } = this;
+    if (!mesh || !surface) return;
+    mesh.plane = new Plane(mesh, logMap);
+    surface.reshape();
+    this.tree = new MeshBVH(mesh.shown, { indirect: true });
+    this.stage.shape = mesh.shown.getAttribute("position").array;
+    this.stage.front.set(0, 0, 1);
+    this.stage.compass.isShown = false;
+  }
+
   /** Draw everything once without extent, so that later nothing waits for its shader. */
   private warmUp(): void {
     const nowhere: Triple[] = [
@@ -103,8 +123,10 @@ export class SceneView {
       [0, 0, 0],
     ];
     this.points.show([{ position: [0, 0, 0], fill: START, size: 0 }]);
-    this.isolines.show({ drawn: () => [0, 0, 0] }, [{ points: nowhere, closed: false }]);
-    this.route.show(nowhere);
+    this.isolines.show({ drawnLines: () => [nowhere] }, [
+      { points: nowhere, closed: false, faces: [] },
+    ]);
+    this.route.show([nowhere]);
     this.stage.warmUp(new Mesh(new PlaneGeometry(0, 0), this.paint));
     this.points.show([]);
     this.isolines.show(null, []);
@@ -129,7 +151,7 @@ export class SceneView {
     this.boundary.show(null, []);
     this.showSpot(null);
     this.route.show([]);
-    this.showWalk([]);
+    this.showWalk(null);
     this.showBorders(new Int32Array(), []);
   }
 
@@ -163,7 +185,7 @@ export class SceneView {
   lookAtAll({ places }: State): void {
     const mesh = this.mesh;
     const points = places.map(({ point }) => point).filter((point) => mesh?.has(point));
-    if (!mesh || points.length === 0) {
+    if (!mesh || mesh.plane || points.length === 0) {
       this.stage.lookAtAll();
       return;
     }
@@ -190,7 +212,7 @@ export class SceneView {
       if (!mesh?.has(point) || !isReadable) return [];
       const isStop = i >= starts && i < places.length - 1;
       const fill = i < starts ? (hasTerritories ? this.colourOf(i) : START) : isStop ? STOP : END;
-      const position = mesh.drawn(positionOf(mesh, point));
+      const position = drawnAt(mesh, point);
       return { position, fill, size: isStop ? 14 : 17, name: nameOf(state, i) };
     });
     this.points.show(shown);
@@ -202,21 +224,23 @@ export class SceneView {
   }
 
   showRoute(outline: Outline | null): void {
-    const points = this.mesh ? (outline?.points ?? []) : [];
-    this.route.show(points.map((point) => this.mesh!.drawn(point)));
+    const { points, faces } = outline ?? {};
+    this.route.show((this.mesh && points && this.mesh.drawnLines(points, faces ?? [])) || []);
   }
 
   /** Show a straight line, and a point at its end. */
-  showWalk(points: readonly Triple[]): void {
-    const drawn = this.mesh ? points.map((point) => this.mesh!.drawn(point)) : [];
+  showWalk(line: Pick<StraightLine, "points" | "faces"> | null): void {
+    const drawn =
+      (this.mesh && line?.points && this.mesh.drawnLines(line.points, line.faces)) || [];
     this.walk.show(drawn);
-    this.walkEnd.show(drawn.slice(-1).map((position) => ({ position, fill: WALK, size: 13 })));
+    const end = drawn.at(-1)?.slice(-1) ?? [];
+    this.walkEnd.show(end.map((position) => ({ position, fill: WALK, size: 13 })));
   }
 
-  showRays(rays: Pick<Line, "points">[]): void {
+  showRays(rays: Pick<Line, "points" | "faces">[]): void {
     this.rays.show(
       this.mesh,
-      rays.map(({ points }) => ({ points, closed: false })),
+      rays.map((ray) => ({ ...ray, closed: false })),
     );
   }
 
@@ -228,7 +252,9 @@ export class SceneView {
   showSpot(position: Triple | null): void {
     const { mesh } = this;
     this.spot.show(
-      mesh && position ? [{ position: mesh.drawn(position), fill: SPOT, size: 15 }] : [],
+      mesh && position && !mesh.plane
+        ? [{ position: mesh.drawn(position), fill: SPOT, size: 15 }]
+        : [],
     );
   }
 
@@ -237,9 +263,9 @@ export class SceneView {
     const { mesh } = this;
     const shown = this.shownLevels.flatMap(({ level, lines }) => {
       const [longest] = lines.toSorted((a, b) => b.length - a.length);
-      const points = longest?.points ?? [];
-      const middle = points[Math.floor(points.length / 2)];
-      return mesh && middle ? { position: mesh.drawn(middle), name: written(level, 3) } : [];
+      const [drawn = []] = mesh?.drawnLines(longest?.points ?? [], longest?.faces ?? []) ?? [];
+      const position = drawn[Math.floor(drawn.length / 2)];
+      return position ? { position, name: written(level, 3) } : [];
     });
     this.levels.show(labels ? shown : []);
     this.stage.invalidateOverlay();

@@ -169,6 +169,14 @@ export class Surface {
     (this.uniform("section").value as Vector4).set(x, y, z, out);
   }
 
+  /** Draw what the mesh shows now: the surface, or its plane. */
+  reshape(): void {
+    const { shown } = this.mesh;
+    shown.setAttribute("value", this.values);
+    shown.setAttribute("tint", this.tints);
+    this.object.geometry = shown;
+  }
+
   setPalette(palette: Palette): void {
     const uniform = this.uniform("ramp");
     (uniform.value as DataTexture).dispose();
@@ -176,7 +184,7 @@ export class Surface {
   }
 
   async setWireframe(isVisible: boolean, colour: Rgb): Promise<void> {
-    if (isVisible && !this.wires) {
+    if (isVisible && !this.wires && !this.mesh.plane) {
       const edges = await this.mesh.allEdges();
       if (this.wires) return;
       const geometry = new BufferGeometry();

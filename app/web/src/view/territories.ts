@@ -3,6 +3,7 @@ import { BufferAttribute, BufferGeometry, Mesh, type ShaderMaterial } from "thre
 import type { Border } from "../api/types";
 import { divide, type Piece } from "../mesh/division";
 import type { LoadedMesh } from "../mesh/loader";
+import { placeIn } from "../mesh/plane";
 import type { Rgb } from "./colours";
 import { IsolineLayer } from "./isolines";
 import { LINES, type Stage } from "./scene";
@@ -45,7 +46,7 @@ function divided(
   borders: Border[],
   colourOf: (source: number) => Rgb,
 ): BufferGeometry {
-  const whole = mesh.geometry;
+  const whole = mesh.shown;
   const [positions, normals, values] = ["position", "normal", "value"].map((name) =>
     whole.getAttribute(name),
   );
@@ -58,7 +59,7 @@ function divided(
   for (const [face, pieces] of piecesByFace(mesh, borders)) {
     const corners = mesh.corners(face);
     const sources = corners.map((corner) => nearest[corner]!);
-    if (sources.some((source) => source < 0)) continue;
+    if (sources.some((source) => source < 0) || mesh.plane?.keeps(face) === false) continue;
     for (const { places, source } of divide(sources, pieces)) {
       for (const [v, w] of places) {
         const weights = [1 - v - w, v, w];
@@ -102,16 +103,4 @@ function piecesByFace(mesh: LoadedMesh, borders: Border[]): Map<number, Piece[]>
     });
   }
   return found;
-}
-
-/** Return the weights of the second and third corner of a face at a position in it. */
-function placeIn(mesh: LoadedMesh, face: number, position: readonly number[]): [number, number] {
-  const [a, b, c] = mesh.corners(face).map((corner) => mesh.vertex(corner));
-  const [p, q, r] = [b!, c!, position].map((end) => end.map((x, axis) => x - a![axis]!));
-  const dot = (x: number[], y: number[]): number =>
-    x.reduce((sum, value, axis) => sum + value * y[axis]!, 0);
-  const [pp, pq, qq, rp, rq] = [dot(p!, p!), dot(p!, q!), dot(q!, q!), dot(r!, p!), dot(r!, q!)];
-  const spread = pp * qq - pq * pq;
-  if (!(spread > 0)) return [0, 0];
-  return [(qq * rp - pq * rq) / spread, (pp * rq - pq * rp) / spread];
 }
