@@ -104,6 +104,7 @@ def test_values_of_a_file_are_coloured_with_their_level_sets(
     view.wait()
 
     asked_for = answer.value.request.post_data_json
+    assert asked_for is not None
     assert asked_for["levels"] == [-0.5, 0, 0.5]
     assert asked_for["values"] == heights.tolist()
     assert view.text("#legend-title") == "heights.csv"
