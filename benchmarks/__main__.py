@@ -16,6 +16,7 @@ from benchmarks import (
     cuts,
     exact,
     fast,
+    first_colours,
     gate,
     large_matrix,
     load,
@@ -62,6 +63,7 @@ BENCHMARKS: dict[str, Callable[[Inputs, int], Section | Iterable[Section]]] = {
     "cluster": cluster.run,
     "large-answers": service.run_large,
     "page": page.run,
+    "first-colours": first_colours.run,
 }
 SOAK, SCALING, FAILURES = "soak", "scaling", "failures"
 PAPER, PEERS, GATE = "paper", "peers", "gate"

@@ -1,8 +1,9 @@
-"""Sections of ``RESULTS.md``: a title, the machine, a table and notes."""
+"""Sections of ``RESULTS.md``: a title, the machine, a table and notes; written and read."""
 
 import datetime as dt
 import os
 import platform
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -39,6 +40,24 @@ def write(section: Section, path: Path) -> None:
     by_title = {part.split("\n", 1)[0]: part.rstrip() for part in sections}
     by_title[section.title] = section.text().removeprefix("## ").rstrip()
     path.write_text("\n\n## ".join([heading.rstrip(), *by_title.values()]) + "\n", encoding="utf-8")
+
+
+def read(path: Path, title: str) -> tuple[str, list[str], list[list[str]]]:
+    """Return the machine, the columns and the rows of a section that was written.
+
+    Raises
+    ------
+    LookupError
+        The file has no such section.
+    """
+    text = path.read_text(encoding="utf-8")
+    for section in re.split(r"(?m)^##? ", text):
+        if section.startswith(f"{title}\n"):
+            (machine_then,) = re.findall(r"(?m)^_(\d{4}-.*)_$", section)
+            lines = [line for line in section.splitlines() if line.startswith("|")]
+            columns, _, *rows = ([cell.strip() for cell in line[1:-1].split("|")] for line in lines)
+            return machine_then, columns, rows
+    raise LookupError(f"{path.name} has no section {title}")
 
 
 def machine() -> str:

@@ -10,12 +10,14 @@ from sphinx.application import Sphinx
 DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS.parent))
 
+from docs.results import with_results  # noqa: E402
 from tests.support.documents import pictures_of, run_examples  # noqa: E402
 
 project = "Geodesic"
 default_role = "py:obj"  # names in backticks lead to what they name, where it is documented
 html_theme = "furo"
 html_title = "Geodesic"
+html_copy_source = False  # the wheel carries the site
 extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
@@ -57,7 +59,13 @@ def leave_out_links_to_the_repository(app: Sphinx, page: str, text: list[str]) -
     text[0] = re.sub(r"\[([^]]+)\]\(([^)#:]+\.md)(?:#[^)]*)?\)", kept, text[0])
 
 
+def insert_results(_app: Sphinx, _page: str, text: list[str]) -> None:
+    """Take figures from the results of benchmarks."""
+    text[0] = with_results(text[0])
+
+
 def setup(app: Sphinx) -> None:
-    """Have the pictures drawn before the pages are read, and links adapted."""
+    """Have the pictures drawn before the pages are read, figures inserted, and links adapted."""
     app.connect("builder-inited", draw)
+    app.connect("source-read", insert_results)
     app.connect("source-read", leave_out_links_to_the_repository)

@@ -1112,6 +1112,7 @@ def mean_point(
 def straighten(
     curve: SurfaceCurve,
     *,
+    free_ends: bool = False,
     progress: Callable[[float], None] | None = None,
     cancel: Callable[[], bool] | None = None,
     deadline_s: float | None = None,
@@ -1119,15 +1120,17 @@ def straighten(
 ) -> SurfaceCurve:
     """Return a curve pulled tight: the shortest of those into which it can be moved, near it.
 
-    Its ends stay. It is straight but for bends at vertices and at the boundary, where neither side
-    leaves it less than half a turn. So it is shorter than all curves near it; another one may be
-    shorter that lies beyond a hill.
+    Its ends stay, unless they are free. It is straight but for bends at vertices and at the
+    boundary, where neither side leaves it less than half a turn. So it is shorter than all curves
+    near it; another one may be shorter that lies beyond a hill.
 
     Parameters
     ----------
     curve
         A path, a straight line, a line of equal value, a border, a boundary, a loop, or any other
         one, made by `TriangleMesh.curve`.
+    free_ends
+        Whether ends on the boundary slide along it, to where the curve is shortest. Others stay.
     progress, cancel, deadline_s, memory_limit
         See `Control`.
 
@@ -1142,9 +1145,10 @@ def straighten(
     Raises
     ------
     NoLoop
-        The curve is closed, and shrinks to a point.
+        The curve is closed, or its ends are free, and it shrinks to a point.
     InvalidArgument
-        The curve was resampled, or is a copy without its mesh.
+        The curve was resampled, or is a copy without its mesh; or its ends are to be free, and none
+        is on the boundary.
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         The call was stopped.
 
@@ -1160,7 +1164,7 @@ def straighten(
     (2.0, 1.414214)
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
-    tight = straightened_curve(curve, control)
+    tight = straightened_curve(curve, control, free_ends=free_ends)
     control.checkpoint(1.0)
     return tight
 

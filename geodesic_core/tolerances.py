@@ -336,11 +336,12 @@ SHORTEST_EDGE = 1e-50
 Edges of no length at all are contracted before.
 """
 
-TRIES = 64
+TRIES = 512
 """Edges over which a straight line of a path is tried, per point of the longest path.
 
 Sheets upon each other, around a sharp tip, can be gone through in more ways than time allows.
-Beyond the limit the line is lost, which is an internal error. Measured: 2.7 at most.
+Beyond the limit the line is lost, which is an internal error. Measured: 2.7 at most, but 340 in a
+soup of needles that share a tip.
 """
 
 THROUGH_VERTEX = 1e-13

@@ -178,20 +178,20 @@ class Surface:
         refuse_unless(
             bool((np.abs(measures) <= HUGE).all()), "a number of the mesh is out of range"
         )
-        self.label = self._labels(measures)
+        barriers, rows = np.asarray(barriers, np.int64), np.arange(len(self.given))
+        refuse_unless(bool(np.isin(barriers, rows).all()), "a barrier is no face")
+        self.label = self._labels(measures, np.setdiff1d(rows, barriers))
         faces = self.label[self.given]
         values = np.zeros(self.count) if values is None else _numbers(values)
         refuse_unless(values.shape == (self.count,), "there is not one value a vertex")
-        is_open = np.isposinf(values[faces])
-        barriers = np.asarray(barriers, np.int64)
-        refuse_unless(bool(np.isin(barriers, np.arange(len(faces))).all()), "a barrier is no face")
-        is_open[barriers] = False
+        is_kept = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+        is_kept[barriers] = False
+        kept = np.flatnonzero(is_kept)
+        is_open = np.isposinf(values[faces[kept]])
         refuse_unless(
             bool((is_open.all(axis=1) == is_open.any(axis=1)).all()), "a face is reached in part"
         )
-        is_kept = (faces != np.roll(faces, 1, axis=1)).all(axis=1) & ~is_open.any(axis=1)
-        is_kept[barriers] = False
-        self.kept = np.flatnonzero(is_kept)
+        self.kept = kept[~is_open.any(axis=1)]
         self.faces = faces[self.kept]
         ends = np.sort(np.stack([self.faces, np.roll(self.faces, -1, axis=1)], axis=2), axis=2)
         keys = ends[..., 0] * self.count + ends[..., 1]
@@ -212,12 +212,16 @@ class Surface:
         self.length = Ball(m, (self.long_length.r.astype(float) + U * m) * UP)
         refuse_unless(bool((self.length.low > 0).all()), "an edge has no length")
 
-    def _labels(self, measures: Array) -> Array:
-        """Return for each vertex the lowest of those joined to it by edges of no length."""
+    def _labels(self, measures: Array, free: Array) -> Array:
+        """Return for each vertex the lowest of those joined to it by edges of no length.
+
+        Only edges of free faces join them.
+        """
         label = np.arange(self.count)
-        tail, head = self.given.ravel(), np.roll(self.given, -1, axis=1).ravel()
-        joined = measures.ravel() == 0.0
-        if self.vertices is not None:
+        tail, head = self.given[free].ravel(), np.roll(self.given[free], -1, axis=1).ravel()
+        if self.vertices is None:
+            joined = measures[free].ravel() == 0.0
+        else:
             joined = (measures[tail] == measures[head]).all(axis=1)
         tail, head = tail[joined], head[joined]
         while (label[tail] != label[head]).any():

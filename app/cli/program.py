@@ -7,7 +7,7 @@ import typer
 from typer.exceptions import TyperException
 
 from app import __version__
-from app.cli import batch, compilation, meshes, queries, serve, tables
+from app.cli import batch, compilation, documents, meshes, queries, serve, tables
 from app.cli.cortex import cortex
 from app.cli.steps import Failure, show_help_without_command
 from app.cli.store import store
@@ -80,6 +80,7 @@ for function in (serve.serve, meshes.info, meshes.sample, tables.matrix, batch.b
 for name, command in queries.COMMANDS.items():
     cli.command(name)(queries.function_of(command))
 cli.command("compile")(compilation.compile_kernels)
+cli.command()(documents.docs)
 cli.add_typer(cortex, name="cortex")
 cli.add_typer(store, name="store")
 cli.add_typer(terrain, name="terrain")

@@ -238,6 +238,10 @@ def _levels(given: Given) -> dict[str, Any]:
     return levels if values is None else {**levels, "values": values.given}
 
 
+def _tightened(given: Given) -> dict[str, Any]:
+    return {**_barriers(given), "free_ends": given["free_ends"]}
+
+
 def _barriers(given: Given) -> dict[str, Any]:
     return {"barriers": given["barriers"] or BlockedFaces()}
 
@@ -641,10 +645,22 @@ COMMANDS = {
         "loop",
         "Pull curves tight: each becomes the shortest near it, open or closed.",
         "Pulling tight",
-        {**_ALONG, **_LINES_OUT, **_WITH_LOCATIONS, "barriers": (Barriers, None)},
+        {
+            **_ALONG,
+            "free_ends": (
+                Annotated[
+                    bool,
+                    typer.Option("--free-ends", help="Let ends on the boundary slide along it."),
+                ],
+                False,
+            ),
+            **_LINES_OUT,
+            **_WITH_LOCATIONS,
+            "barriers": (Barriers, None),
+        },
         {"curves": "along"},
         _of_loops,
-        _barriers,
+        _tightened,
     ),
     "cut": Command(
         "cut",

@@ -43,21 +43,23 @@ TAGS = [
         "name": "queries",
         "description": "Distances, paths, log maps, straight lines, isolines, borders, matrices "
         "and nearest points on a stored mesh. Each query answers in JSON, or in other formats by "
-        "`Accept` or `format`. With `Prefer: respond-async` it becomes a job.",
+        "`Accept` or `format`. With `Prefer: respond-async` it becomes a job. `geodesic docs http` "
+        "opens the chapter.",
     },
     {
         "name": "meshes",
         "description": "Upload, list, describe and remove meshes. The id of a mesh is a hash of "
-        "its content, so that no mesh is stored twice.",
+        "its content, so that no mesh is stored twice. `geodesic docs tour` opens the tutorial.",
     },
     {
         "name": "jobs",
         "description": "Queries that are answered in the background: their state and progress, "
-        "their answers, and how to stop them.",
+        "their answers, and how to stop them. `geodesic docs http#jobs` opens the chapter.",
     },
     {
         "name": "service",
-        "description": "The service itself: health, limits, metrics, and the meaning of errors.",
+        "description": "The service itself: health, limits, metrics, and the meaning of errors. "
+        "`geodesic docs operations` opens the chapter.",
     },
 ]
 """What the operations are grouped by"""

@@ -1,10 +1,9 @@
 """A mesh cut along curves: a new mesh, and the way back to the old one."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 import geodesic_core as gc
@@ -15,9 +14,6 @@ from app.queries.points import SurfacePoints, points_in_curves, split_points, to
 from app.queries.validation import FAULTS_SHOWN, WrittenPoints, naming
 from app.schemas.requests import CutRequest
 from app.store.meshes import CUT_ARRAYS, OpenMesh, content_hash
-
-_SNAPPING = 2.0**-30
-"""Weight up to which a point counts as on the edge where that weight is 0, see `gc.cut`"""
 
 
 class CutQuery(Query[CutRequest]):
@@ -73,7 +69,7 @@ class CutQuery(Query[CutRequest]):
             vertices=len(cut.vertices),
             faces=len(cut.faces),
             parts=int(cut.parts.max()) + 1,
-            snapped=_snapped(given),
+            snapped={"count": len(cut.snapped), "ids": cut.snapped[:FAULTS_SHOWN].tolist()},
         )
         return cut, about
 
@@ -81,14 +77,3 @@ class CutQuery(Query[CutRequest]):
 def arrays_of(cut: gc.CutMesh) -> Mapping[str, NDArray[Any]]:
     """Return the arrays that lead from a cut mesh back to the old one, by name."""
     return {name: getattr(cut, name) for name in CUT_ARRAYS}
-
-
-def _snapped(curves: Sequence[SurfacePoints]) -> dict[str, Any]:
-    """Return the points that are nearly on a vertex or an edge: their number, and the first."""
-    found = [
-        (i, k)
-        for i, points in enumerate(curves)
-        for k, weights in enumerate(np.array([point.barycentric for point in points]))
-        if ((weights > 0.0) & (weights <= _SNAPPING)).any()
-    ]
-    return {"count": len(found), "ids": found[:FAULTS_SHOWN]}

@@ -34,6 +34,8 @@ class LoopQuery(Query[LoopRequest]):
         """Refuse a request for two kinds of loops at once."""
         if request.through is not None and request.curves is not None:
             raise invalid_fields(["/through", "/curves"], "give at most one of the two")
+        if request.free_ends and request.curves is None:
+            raise invalid_fields(["/free_ends"], "loops have no ends: give curves to pull tight")
         return request
 
     def written_points(self) -> WrittenPoints:
@@ -75,7 +77,8 @@ class LoopQuery(Query[LoopRequest]):
         curves = to_curves(mesh, request.curves, split_points(request.curves, points))
         tight = []
         for i, curve in enumerate(curves):
-            with naming((gc.errors.NoLoop, f"/curves/{i}")):
+            faults = gc.errors.NoLoop, gc.errors.InvalidArgument
+            with naming(*((fault, f"/curves/{i}") for fault in faults)):
                 part = context.part(i, len(curves))
-                tight.append(gc.straighten(curve, **part.options))
+                tight.append(gc.straighten(curve, free_ends=request.free_ends, **part.options))
         return tight

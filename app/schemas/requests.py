@@ -373,6 +373,11 @@ class LoopRequest(AskingForLines):
         "they are. The `locations` of lines in answers are such points. With neither of the two, "
         "two loops are looked for at each handle",
     )
+    free_ends: bool = Field(
+        default=False,
+        description="Whether ends of `curves` on the boundary slide along it, to where each is "
+        "shortest",
+    )
 
 
 class CutRequest(QueryBody):

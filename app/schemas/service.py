@@ -89,3 +89,6 @@ class ProblemCode(BaseModel):
     other_statuses: list[int] = Field(description="Further statuses; `meaning` says when")
     title: str
     meaning: str
+    chapter: str = Field(
+        description="Chapter of the documents that tells more: `geodesic docs CHAPTER` opens it"
+    )

@@ -3,6 +3,7 @@ import { defineConfig } from "vite";
 
 export default defineConfig({
   base: "./", // a proxy may offer the page below a prefix
+  resolve: { tsconfigPaths: true }, // the client is its sources
   build: {
     target: "es2022",
     assetsInlineLimit: 0,

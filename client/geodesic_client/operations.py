@@ -425,15 +425,22 @@ def straighten(
     mesh: Mesh | str,
     curves: SurfaceLine | Sequence[SurfaceLine | Sequence[Point]],
     *,
+    free_ends: bool = False,
     barriers: Sequence[int] = (),
     include: Sequence[Literal["locations"]] = (),
     progress: Progress = ignore_progress,
 ) -> Flow[list[Loop]]:
     """Return curves pulled tight, in their order: each the shortest near it, with the same ends.
 
-    Curves are given as for `cut`. Lines of answers that are closed stay closed.
+    With ``free_ends``, ends on the boundary slide along it to where the curve is shortest. Curves
+    are given as for `cut`. Lines of answers that are closed stay closed.
     """
-    body = _body(curves=_as_curves(curves), barriers=barriers, include=include)
+    body = _body(
+        curves=_as_curves(curves),
+        free_ends=free_ends or None,  # older services do not know it
+        barriers=barriers,
+        include=include,
+    )
     return (yield from _ask(mesh, "loop", body, to_loops, progress))
 
 

@@ -18,6 +18,7 @@ from geodesic_core.cutting.whole_numbers import (
     Surroundings,
     points_of,
     segments_of,
+    snapped_of,
     surroundings_of,
 )
 from geodesic_core.kernels.cutting.predicates import STEPS
@@ -67,6 +68,7 @@ def cut_along(
         curve_edges=joined.curve_edges,
         edge_curves=joined.edge_curves,
         copy_of=copy_of,
+        snapped=snapped_of(lines),
         _locations=joined.locations,
     )
 

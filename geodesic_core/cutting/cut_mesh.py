@@ -50,6 +50,9 @@ class CutMesh:
     each curve that runs along an edge, by edge."""
     copy_of: Longs
     """(V',) int64: the vertex that each one was before curves were opened, itself for most."""
+    snapped: Longs
+    """(P, 2) int64: numbers of a curve and of a point of it that is within 2**-30 of a vertex or an
+    edge, as a weight, and not on it: the curve runs through that instead."""
     _locations: Locations
 
     @cached_property

@@ -133,6 +133,21 @@ def in_steps(weights: Floats) -> Longs:
     return steps
 
 
+def snapped_of(lines: Sequence[Line]) -> Longs:
+    """Return pairs of a line and a point of it that is NEAR a vertex or an edge, not on it (P, 2).
+
+    It snaps there. Segments between other points pass no vertex that NEAR.
+    """
+    pairs = [
+        (i, k)
+        for i, line in enumerate(lines)
+        for k in np.flatnonzero(
+            ((line.location_weights > 0.0) & (in_steps(line.location_weights) == 0)).any(axis=1)
+        ).tolist()
+    ]
+    return np.array(pairs, np.int64).reshape(-1, 2)
+
+
 def points_of(
     mesh: TriangleMesh, around: Surroundings, lines: Sequence[Line]
 ) -> tuple[CurvePoints, EdgePoints]:

@@ -14,7 +14,8 @@ import numpy as np
 
 from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.control import Control, rounds
-from geodesic_core.errors import InternalError, NoLoop
+from geodesic_core.errors import InternalError, InvalidArgument, NoLoop
+from geodesic_core.fields.free_ends import has_free_end, slid
 from geodesic_core.kernels.mesh.half_edges import HEAD, OPPOSITE, TAIL
 from geodesic_core.kernels.paths import funnel
 from geodesic_core.kernels.paths.funnel import LEFT, NEITHER, RIGHT, String, Strip
@@ -69,18 +70,22 @@ def _joined(lines: Sequence[_Line]) -> _Line:
     )
 
 
-def straightened_curve(curve: SurfaceCurve, control: Control) -> SurfaceCurve:
-    """Return a curve pulled tight.
+def straightened_curve(
+    curve: SurfaceCurve, control: Control, *, free_ends: bool = False
+) -> SurfaceCurve:
+    """Return a curve pulled tight; if ``free_ends``, those on the boundary slide along it.
 
     Raises
     ------
     InvalidArgument
-        The curve has no mesh, or was resampled.
+        The curve has no mesh, or was resampled; or no end is free.
     NoLoop
-        It is closed and shrinks to a point.
+        It is closed, or its ends are free, and it shrinks to a point.
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As the control says.
     """
+    if free_ends and curve.closed:
+        raise InvalidArgument("no end of the curve is free: it is closed")
     control.check_memory(_BYTES_OF_SEGMENT * len(curve.faces))
     pieces = None
     for part in rounds(control):
@@ -93,12 +98,19 @@ def straightened_curve(curve: SurfaceCurve, control: Control) -> SurfaceCurve:
         if first is None:
             return straight_loop(mesh, line.strips(mesh)[0], part)
         strips = line.turned(first).strips(mesh)
+        is_free = _free_ends_of(mesh, strips) if free_ends else (False, False)
         if pieces is not None and len(strips) >= pieces:
             break
         # Where a piece between two sheets has shrunk to nothing, those beside it may be one
         pieces = len(strips)
         pulled = [
-            _straightened(mesh, strip, part.for_part(i, pieces)) for i, strip in enumerate(strips)
+            _freed(
+                mesh,
+                strip,
+                (is_free[0] and i == 0, is_free[1] and i == pieces - 1),
+                part.for_part(i, pieces),
+            )
+            for i, strip in enumerate(strips)
         ]
         curve = curve_in(mesh, pulled, closed=curve.closed)
         if pieces == 1:
@@ -106,6 +118,36 @@ def straightened_curve(curve: SurfaceCurve, control: Control) -> SurfaceCurve:
     if curve.closed and len(curve.faces) == 0:
         raise _shrunk()
     return curve
+
+
+def _free_ends_of(mesh: TriangleMesh, strips: Sequence[Strip]) -> tuple[bool, bool]:
+    """Return which ends of strips are on the boundary: one at least."""
+    is_free = has_free_end(mesh, strips[0], 0), has_free_end(mesh, strips[-1], 1)
+    if not any(is_free):
+        raise InvalidArgument("no end of the curve is free: none is on the boundary of the surface")
+    return is_free
+
+
+def _freed(
+    mesh: TriangleMesh, strip: Strip, is_free: tuple[bool, bool], control: Control
+) -> tuple[Strip, String]:
+    """Return a strip whose string is straight, and shortest among those of its free ends.
+
+    Each round but the last makes it shorter, by more than SHORTER of its length.
+    """
+    if not any(is_free):
+        return _straightened(mesh, strip, control)
+    longest, best = 0.0, None
+    for part in islice(rounds(control), MOST_PASSES):
+        strip, string = _straightened(mesh, strip, part.for_part(0, 2))
+        longest = max(longest, string.length)
+        if string.length <= SHORTER * longest:
+            raise _shrunk()
+        if best is not None and string.length >= best[1].length * (1.0 - SHORTER):
+            return best
+        best = strip, string
+        strip, _ = slid(mesh, strip, is_free, part.for_part(1, 2))
+    raise _endless()
 
 
 def loop_of(mesh: TriangleMesh, portals: Ints, control: Control) -> SurfaceCurve:
@@ -148,7 +190,7 @@ def _straightened(mesh: TriangleMesh, strip: Strip, control: Control) -> tuple[S
 
 
 def _shrunk() -> NoLoop:
-    return NoLoop("the curve shrinks to a point: no loop of its kind is shortest")
+    return NoLoop("the curve shrinks to a point: none of its kind is shortest")
 
 
 def _endless() -> InternalError:

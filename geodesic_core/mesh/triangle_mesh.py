@@ -464,8 +464,24 @@ class TriangleMesh:
     @cached_property
     def barriers(self) -> Longs:
         """(B,) int64: the faces that are blocked, ascending; see `with_barriers`."""
-        nodes = self.topology.inner_vertex[self.faces]
-        return np.flatnonzero((self.inner_face < 0) & of_three_vertices(nodes))
+        outside = np.flatnonzero((self.inner_face < 0) & of_three_vertices(self.faces))
+        nodes = self.topology.inner_vertex[self.faces[outside]]
+        # A free face would have joined the ends of its edges of no length.
+        is_apart = nodes != np.roll(nodes, -1, axis=1)
+        is_blocked = of_three_vertices(nodes) | (is_apart & self._have_no_length(outside)).any(
+            axis=1
+        )
+        blocked: Longs = outside[is_blocked]
+        return blocked
+
+    def _have_no_length(self, faces: Longs) -> NDArray[np.bool_]:
+        """Return which edges of faces have no length, (N, 3), from corner i to corner i + 1."""
+        if self.lengths is not None:
+            have_none: NDArray[np.bool_] = self.lengths[faces] == 0.0
+        else:
+            corners = self.vertices[self.faces[faces]]
+            have_none = (corners == np.roll(corners, -1, axis=1)).all(axis=2)
+        return have_none
 
     @cached_property
     def nbytes(self) -> int:

@@ -1,5 +1,6 @@
 """The distributions of this repository: one version, and each its own folder."""
 
+import importlib
 import json
 import re
 import subprocess
@@ -15,6 +16,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from app import __version__
+from app.cli.documents import PLACES
 from geodesic_core.kernels.jit.cache import PRECOMPILED
 from tests.support.fresh import told_by
 from tests.support.paths import ROOT
@@ -103,6 +105,26 @@ def test_all_extras_of_the_library_are_in_one() -> None:
     for name in ("tables", "terrain", "vtk", "plot"):  # large
         del extras[name]
     assert extras.pop("all") == [f"geodesic-core[{','.join(extras)}]"]
+
+
+def test_distributions_carry_the_documents_where_they_were_built(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("hatchling.builders.wheel")
+    hatch_build = importlib.import_module("hatch_build")
+    monkeypatch.setattr(hatch_build, "build", lambda _root: None)
+    site = tmp_path / "docs" / "_build"
+
+    def included() -> dict[str, str]:
+        build_data: dict[str, Any] = {"artifacts": [], "force_include": {}}
+        hook = hatch_build.PageHook(str(tmp_path), {}, None, None, "", "wheel")
+        hook.initialize("standard", build_data)
+        assert PLACES[0].relative_to(ROOT).as_posix() in build_data["artifacts"]
+        return dict(build_data["force_include"])
+
+    assert included() == {}
+    site.mkdir(parents=True)
+    assert included() == {str(site): PLACES[0].relative_to(ROOT).as_posix()}
 
 
 @pytest.mark.slow

@@ -27,8 +27,10 @@ DOCUMENTS = sorted(
 )
 BLENDER = shutil.which("blender")
 HOWTO_OF_BLENDER = ROOT / "docs" / "howto" / "blender.md"
-GALLERY = pytest.param("gallery.md", 8, marks=(pytest.mark.jit, pytest.mark.full))
-"""Its pictures take 12 s, and `scripts/docs` draws them as well."""
+REFERENCE = [
+    f"reference/{path.name}" for path in sorted((ROOT / "docs" / "reference").glob("*.md"))
+]
+"""Their pictures take 15 s, and `scripts/docs` draws them as well."""
 PAGES_OF_EXAMPLES = [
     "start.md",
     *(
@@ -167,7 +169,7 @@ def test_docstrings_of_modules_begin_with_a_noun_or_a_verb(folder: str) -> None:
     [
         ("algorithm.md", 4),
         ("sharing.md", 4),
-        GALLERY,
+        *(pytest.param(name, 0, marks=(pytest.mark.jit, pytest.mark.full)) for name in REFERENCE),
         *(pytest.param(name, 8, marks=pytest.mark.jit) for name in PAGES_OF_EXAMPLES),
     ],
 )
@@ -182,13 +184,8 @@ def test_the_examples_of_documents_run(
 
 @pytest.mark.jit
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["README.md", "docs/library.md"])
-def test_python_in_documents_runs(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    blocks = re.findall(r"```python\n(.*?)```", (ROOT / name).read_text(), re.DOTALL)
-    monkeypatch.chdir(tmp_path)
-    gc.samples.knot(100_000).to_trimesh().export(tmp_path / "knot.ply")
+def test_python_in_the_readme_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
     for block in blocks:
         exec(block, {})  # noqa: S102 - our own documents
 

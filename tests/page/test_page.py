@@ -12,6 +12,7 @@ from pathlib import Path
 import httpx2
 import numpy as np
 import pytest
+import trimesh
 from PIL import Image
 from playwright.sync_api import FilePayload, Route, expect
 
@@ -802,6 +803,14 @@ def test_wireframe_and_theme(view: View, sphere: str) -> None:
 # Wait
 
 
+def coloured(view: View) -> float:
+    """Return the share of the canvas that has colours of distance."""
+    box = view.page.locator("#canvas").bounding_box()
+    assert box is not None
+    pixels = view.pixels()[100:600, int(box["x"]) + 200 :]
+    return float((np.ptp(pixels, axis=2) > 60).mean())
+
+
 @pytest.fixture
 def slow_workers(server: Server) -> Iterator[None]:
     """Workers that need ten times as long, so that a query is long on any machine."""
@@ -810,14 +819,16 @@ def slow_workers(server: Server) -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("slow_workers")
-def test_a_long_query_tells_its_progress_and_can_be_cancelled(view: View, large: str) -> None:
+def test_a_long_query_is_rough_first_tells_its_progress_and_can_be_cancelled(
+    view: View, server: Server, large: str
+) -> None:
     view.open(f"/?mesh={large}&{PLAIN}")
-    streams: list[str] = []
-    view.page.on(
-        "request", lambda each: streams.append(each.url) if "/events" in each.url else None
-    )
     view.ask("v0")
     told = view.page.locator("#progress[value]")
+    rough = view.page.locator("#legend-title", has_text="Rough distance in")
+    rough.wait_for()
+    assert "(estimated)" in view.text("#notes")
+    assert coloured(view) > 0.02
     told.wait_for()
     first = float(told.get_attribute("value") or 0)
     while float(told.get_attribute("value") or 0) <= first:
@@ -827,13 +838,16 @@ def test_a_long_query_tells_its_progress_and_can_be_cancelled(view: View, large:
         view.page.click("#cancel")
     view.wait()
 
-    assert len(streams) == 1
-    assert np.ptp(view.colour()) < 40, "not coloured"
-    service = view.page.url.split("/?")[0]
-    wait_until(lambda: not httpx2.get(f"{service}/v1/jobs").json()["jobs"])
+    assert not view.page.is_visible("#legend")
+    assert coloured(view) < 0.02
+    wait_until(lambda: not server.client.get("/v1/jobs").json()["jobs"])
 
     view.ask("v1")
-    told.wait_for()
+    rough.wait_for()
+    stopped = server.metric("geodesic_cancellations_total")
+    view.ask("v2")  # stops the work on exact distances from v1
+    wait_until(lambda: server.metric("geodesic_cancellations_total") > stopped)
+    rough.wait_for()
     view.page.keyboard.press("Escape")
     view.wait()
     assert not view.page.is_visible("#legend")
@@ -885,6 +899,26 @@ def test_downloads(view: View, knot: str, tmp_path: Path) -> None:
     download.value.save_as(tmp_path / "p.png")
     picture = np.asarray(Image.open(tmp_path / "p.png").convert("RGB"), int)
     assert (np.abs(picture - PATH).max(axis=2) < 12).sum() > 100
+
+    with view.page.expect_download() as download:
+        view.page.click("#glb")
+    download.value.save_as(tmp_path / "g.glb")
+    scene = trimesh.load_scene(tmp_path / "g.glb")
+    surface, path = (scene.geometry[scene.graph[name][1]] for name in ("surface", "path"))
+    assert path.length == pytest.approx(length_of(view), rel=1e-5)
+    assert len(surface.vertices) == len(distances)
+    colours = np.asarray(surface.visual.vertex_attributes["color"])[:, :3]
+    near, far = colours[np.argmin(distances)], colours[np.argmax(distances)]
+    assert near.mean() < far.mean(), "from dark to light"
+
+    with view.page.expect_download() as download:
+        view.page.click("#geojson")
+    download.value.save_as(tmp_path / "g.geojson")
+    features = json.loads((tmp_path / "g.geojson").read_text())["features"]
+    assert {each["properties"]["name"] for each in features} == {"path", "isoline"}
+    (line,) = (each for each in features if each["properties"]["name"] == "path")
+    steps = np.diff(line["geometry"]["coordinates"], axis=0)
+    assert np.linalg.norm(steps, axis=1).sum() == pytest.approx(length_of(view), rel=1e-5)
 
     written = set(httpx2.get(view.page.url.split("/?")[0] + "/v1").json()["answer_formats"])
     for what, formats in {"path": {"obj", "csv"}, "isolines": {"obj", "csv"}}.items():

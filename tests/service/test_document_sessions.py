@@ -15,8 +15,8 @@ import pytest
 from tests.support.paths import ROOT
 from tests.support.processes import Server
 
-DOCUMENTS = ("tour.md", "command-line.md")
-"""In this order: the first makes the mesh file of the second."""
+DOCUMENTS = ("tour.md", "http.md", "command-line.md")
+"""In this order: the first makes the mesh that the others ask about."""
 ELSEWHERE = "http://there"
 """The host in sessions that need other machines."""
 ASSIGNMENT = re.compile(r"[A-Z]+=")

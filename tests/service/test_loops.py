@@ -78,6 +78,18 @@ def test_straightened_curves_are_the_library_s(client: TestClient, knot: str) ->
     np.testing.assert_allclose(lengths, [line.length for line in tight], rtol=1e-12)
 
 
+def test_free_ends_slide_along_the_boundary(client: TestClient, plane: str) -> None:
+    mesh = stored_mesh(client, plane)
+    curves = [{"polyline": as_written(gc.shortest_path(mesh, 5, 60))}]
+    (line,) = ask(client, plane, curves=curves, free_ends=True).json()["lines"]
+    own = gc.straighten(gc.shortest_path(mesh, 5, 60), free_ends=True)
+    check_lines([line], [own])
+    inside = [{"polyline": as_written(gc.shortest_path(mesh, 12, 96))}]
+    for body in ({"curves": inside}, {}):
+        refused = check_problem(ask(client, plane, **body, free_ends=True), 422, "invalid_request")
+        assert refused["errors"][0]["pointer"] == ("/curves/0" if body else "/free_ends")
+
+
 def test_curves_stay_off_barriers(client: TestClient, plane: str) -> None:
     mesh, walls = stored_mesh(client, plane), [60, 61, 62, 63]
     walled = mesh.with_barriers(walls)

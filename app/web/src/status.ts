@@ -1,8 +1,9 @@
 // The page's state of work, as users, screen readers and tests see it: loading, busy, ready, error.
-import { isAbort, setKey } from "./api/http";
-import { ProblemError } from "./api/problemError";
+import { ProblemError } from "geodesic-client";
 import { byId } from "./dom";
 import { InputError } from "./inputError";
+import { inWords } from "./problemWords";
+import { isAbort, setKey } from "./service";
 
 /** Work on a question, on the mesh itself, or on lines: these follow an answer, and no question. */
 type Kind = "loading" | "busy" | "drawing";
@@ -81,20 +82,22 @@ export class Status {
   }
 
   private describe(error: unknown): void {
-    const problem = error instanceof ProblemError ? error.problem : null;
+    const problem = error instanceof ProblemError ? error : null;
     const input = error instanceof InputError ? error : null;
     const isOffline = error instanceof TypeError && /fetch/i.test(error.message);
     byId("error-title").textContent =
-      problem?.title ??
+      problem?.document.title ??
       input?.title ??
       (isOffline ? "The service does not answer" : "Something went wrong");
     byId("error-detail").textContent = isOffline
       ? "It may have stopped, or the network may be down."
-      : error instanceof Error
-        ? error.message
-        : String(error);
+      : problem
+        ? inWords(problem)
+        : error instanceof Error
+          ? error.message
+          : String(error);
     byId("error-hint").textContent = problem?.hint ?? input?.hint ?? "";
-    byId("error-request").textContent = problem?.request_id ? `Request ${problem.request_id}` : "";
+    byId("error-request").textContent = problem?.requestId ? `Request ${problem.requestId}` : "";
     byId("key-form").hidden = problem?.status !== 401;
     if (!isOffline && !problem && !input) console.error(error);
   }

@@ -1,5 +1,5 @@
+import type { SweepAnswer } from "geodesic-client";
 import { describe, expect, test } from "vitest";
-import type { SweepAnswer } from "../src/api/types";
 import { Film } from "../src/film/film";
 
 /** A sweep whose steps are a source, a pop, a crossing that trims, a pseudosource, and the rest. */

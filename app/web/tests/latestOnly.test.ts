@@ -1,5 +1,5 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import { LatestOnly } from "../src/api/latestOnly";
+import { LatestOnly } from "../src/ask/latestOnly";
 import { Random } from "./support/random";
 
 beforeEach(() => void vi.useFakeTimers());
@@ -51,6 +51,26 @@ test("of those that wait only the latest is answered", async () => {
   await vi.runAllTimersAsync();
 
   expect(server.log).toEqual(["answered 1", "answered 4"]);
+});
+
+test("what only refines an answer is aborted at once, and not begun for an old request", async () => {
+  const log: string[] = [];
+  const latestOnly = new LatestOnly<number>(async (request, { signal }) => {
+    log.push(`answered ${request}`);
+    if (!latestOnly.refines()) return;
+    await new Promise((resolve, reject) => {
+      setTimeout(resolve, 1000);
+      signal.addEventListener("abort", () => reject(signal.reason));
+    });
+    log.push(`refined ${request}`);
+  }, vi.fn());
+  latestOnly.ask(1);
+  await vi.advanceTimersByTimeAsync(10);
+  latestOnly.ask(2);
+  await vi.advanceTimersByTimeAsync(1);
+  expect(log).toEqual(["answered 1", "answered 2"]);
+  await vi.runAllTimersAsync();
+  expect(log).toEqual(["answered 1", "answered 2", "refined 2"]);
 });
 
 test("a superseded request is aborted after 100 ms, and not before", async () => {

@@ -1,5 +1,4 @@
 import { describe, expect, test } from "vitest";
-import type { Point } from "../src/api/types";
 import type { Triple } from "../src/mesh/frame";
 import {
   actOf,
@@ -12,6 +11,7 @@ import {
   type Tool,
   without,
 } from "../src/state/places";
+import type { Point } from "../src/state/point";
 import { placesAt } from "./support/points";
 
 const at = (vertex: number): Point => ({ vertex });

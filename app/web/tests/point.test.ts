@@ -1,5 +1,5 @@
 import { describe, expect, test } from "vitest";
-import type { Point } from "../src/api/types";
+import type { Point } from "../src/state/point";
 import {
   parsePlaces,
   parsePoint,

@@ -1,6 +1,7 @@
+import type { StraightLine } from "geodesic-client";
 import { describe, expect, test, vi } from "vitest";
-import type { Point, StraightLine } from "../src/api/types";
 import { shortestParts } from "../src/ask/rays";
+import type { Point } from "../src/state/point";
 import { Random } from "./support/random";
 
 /** A line along x, a vertex at each unit. */

@@ -31,7 +31,7 @@ test("extremes leave out what is no number", () => {
 test("levels are the multiples of a spacing strictly between the extremes", () => {
   const values = { name: "", key: 1, numbers: Float64Array.of(-1, 0.4, 1, Number.NaN) };
   expect(levelSetsOf(values, { spacing: 0.5 })).toEqual({
-    values: [-1, 0.4, 1, null],
+    values: Float64Array.of(-1, 0.4, 1, Number.NaN),
     levels: [-0.5, 0, 0.5],
   });
 });

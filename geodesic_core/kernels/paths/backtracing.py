@@ -12,7 +12,8 @@ path is no shorter than the exact one, and longer than the field's value by ξ a
 
 The sweep does not record from which face of an irregular edge a line came. There the walk *forks*:
 it tries the faces in turn, and goes back to the latest fork when it is lost. Any line that ends at
-the pseudosource, straight and of the right length, will do.
+the pseudosource, straight and of the right length, will do. Through sheets upon each other it comes
+to the same place in many ways: from there on it is tried once.
 """
 
 import math
@@ -70,6 +71,9 @@ from geodesic_core.tolerances import FORKS, GAP, ON_PATH, SAME_PLACE, TRIES, WID
 
 LAST_AT = 1024
 """Half-edges that a walk remembers to have crossed, about; a power of two."""
+
+TRIED = 2048
+"""Walks of a line that are remembered after forks, about; a power of two."""
 
 
 class End(NamedTuple):
@@ -196,12 +200,27 @@ class Trail(NamedTuple):
 
 
 class Forks(NamedTuple):
-    """A stack of walks at points where another face may be tried."""
+    """A stack of walks at points where another face may be tried, and what has been tried."""
 
     floats: Floats
     """(FORKS, 5): x, sx, sy, sigma, walked"""
     ints: Ints
     """(FORKS, 4): half_edge, reference, node_count, after"""
+    tried_floats: Floats
+    """(TRIED, 3): x, sx, sy of walks after a fork"""
+    tried_ints: Ints
+    """(TRIED, 3): the first node of their line, 0 where there is none; half_edge, reference"""
+
+
+@kernel
+def new_forks() -> Forks:
+    """Return forks of a path to come."""
+    return Forks(
+        np.empty((FORKS, 5)),
+        np.empty((FORKS, 4), np.int32),
+        np.empty((TRIED, 3)),
+        np.zeros((TRIED, 3), np.int32),
+    )
 
 
 @kernel
@@ -223,7 +242,7 @@ def trace_path(
     view = view_of(topology, winners)
     last_at = np.empty(LAST_AT, np.int32)
     trail = Trail(pointer(nodes), pointer(parameters), pointer(faces), len(nodes), last_at)
-    forks = Forks(np.empty((FORKS, 5)), np.empty((FORKS, 4), np.int32))
+    forks = new_forks()
     nodes[0], parameters[0] = -1 - target, 0.0
     count, end = 1, end_at(view, target)
     while end.entry_edge >= 0:
@@ -305,7 +324,7 @@ def trace_line(
             walk = enter(view, line, walk, h, same)
             sight = look_ahead(view, line, walk)
             is_wrong = append_node(view, trail, walk, count) or is_too_far(view, line, walk, sight)
-            is_lost = open_forks > 0 and is_wrong
+            is_lost = open_forks > 0 and (is_wrong or was_tried(view, forks, walk, count))
         if not is_lost:
             start = start_in_face(view, line, walk, sight, open_forks == 0)
             if start >= 0:
@@ -593,6 +612,24 @@ def is_past_start(view: View, line: Line, walk: Walk) -> bool:
     if line.sw == 0.0:
         return walk.sigma - view.winners.vertices.distance[pseudosource_of(reference)] < -close
     return -walk.sy < -close
+
+
+@kernel
+def was_tried(view: View, forks: Forks, walk: Walk, first: int) -> bool:
+    """Whether a walk of the line with this first node has been here before; remembers that it is.
+
+    Walks that share a row of the table forget each other.
+    """
+    h, length = walk.half_edge, view.mesh.geometry[ROW * walk.half_edge + LENGTH]
+    row = (31 * h + int(256.0 * walk.x / length)) % TRIED
+    floats, ints, near = forks.tried_floats, forks.tried_ints, SAME_PLACE * length
+    if ints[row, 0] == first and ints[row, 1] == h and ints[row, 2] == walk.reference:
+        off = max(abs(floats[row, 0] - walk.x), abs(floats[row, 1] - walk.sx))
+        if max(off, abs(floats[row, 2] - walk.sy)) <= near:
+            return True
+    ints[row, 0], ints[row, 1], ints[row, 2] = first, h, walk.reference
+    floats[row, 0], floats[row, 1], floats[row, 2] = walk.x, walk.sx, walk.sy
+    return False
 
 
 @kernel

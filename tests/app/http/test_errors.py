@@ -1,5 +1,6 @@
 import errno
 import pickle
+import re
 
 import pytest
 from starlette.testclient import TestClient
@@ -14,6 +15,7 @@ from app.errors import (
     problem_of,
 )
 from geodesic_core import errors as core
+from tests.support.paths import ROOT
 from tests.support.service import check_problem
 
 CONTRACT = {
@@ -64,6 +66,12 @@ def test_the_type_of_every_problem_can_be_read(client: TestClient, code: str) ->
 
     assert response.status_code == 200
     told = response.json()
+    page, _, heading = told.pop("chapter").partition("#")
+    text = (ROOT / "docs" / f"{page}.md").read_text()
+    titles = re.findall(r"(?m)^#+ (.+)$", text)
+    assert not heading or heading in {
+        re.sub("[^a-z -]", "", title.lower()).replace(" ", "-") for title in titles
+    }
     statuses = [told.pop("status"), *told.pop("other_statuses")]
     assert statuses == [status for status, codes in CONTRACT.items() if code in codes]
     assert told == {"code": code, "title": CODES[code].title, "meaning": CODES[code].meaning}

@@ -283,6 +283,16 @@ def test_a_surface_by_lengths_is_cut_like_the_one_in_space():
     assert np.abs(placed.mesh.lengths - expected).max() <= 1e-14
 
 
+def test_points_that_snap_are_told():
+    mesh = gc.samples.plane(8)
+    near, off = MERGE / 2, 2 * MERGE
+    weights = [(1 - 2 * w, w, w) for w in (near, off)]
+    weights += [(0.5 - w, 0.5, w) for w in (near, off, 0.0)]
+    line = gc.Curve([gc.SurfacePoint.face(0, each) for each in weights])
+    cut = gc.cut(mesh, [gc.Curve([0, 1]), line])
+    assert cut.snapped.tolist() == [[1, 0], [1, 2]]
+
+
 @pytest.mark.parametrize("share", [0.5, 2.0])
 def test_merge_makes_points_one_that_are_nearer(share):
     mesh = gc.samples.plane(2)

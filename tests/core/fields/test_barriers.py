@@ -423,3 +423,15 @@ def test_a_vertex_in_no_face_is_not_in_a_blocked_one():
     mesh = gc.TriangleMesh([*np.eye(3), [1.0, 1.0, 0.0], [5.0, 5.0, 5.0]], [[0, 1, 2], [0, 1, 3]])
     with warnings.catch_warnings(action="error"):
         assert np.isfinite(gc.exact_distance(mesh, 4, barriers=[0]).distances).sum() == 1
+
+
+def test_a_blocked_face_stays_blocked_though_its_corners_are_at_one_place():
+    """Two of them are one vertex of the surface, by a free face; the third is not joined to it."""
+    vertices = [[0, 0, 0], [0, 0, 0], [0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 0]]
+    mesh = gc.TriangleMesh(vertices, [[0, 1, 2], [0, 1, 3], [1, 3, 4], [2, 4, 5]])
+    blocked = mesh.with_barriers([0])
+    assert blocked.barriers.tolist() == [0]
+    assert gc.exact_distance(blocked, 3).distance_at(2) == pytest.approx(1 + 2**0.5)
+    twice = blocked.with_barriers([3])
+    assert twice.barriers.tolist() == [0, 3]
+    assert twice.topology.inner_vertex[2] != twice.topology.inner_vertex[1]

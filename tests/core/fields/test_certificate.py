@@ -15,7 +15,7 @@ from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument
 from geodesic_core.fields.certificate import rises_and_jumps
 from geodesic_core.tolerances import CERTIFIED
-from tests.support import zoo
+from tests.support import random_meshes, zoo
 from tests.support.meshes import mesh_of, random_points
 
 ROUNDED = 1e-13
@@ -125,6 +125,50 @@ def test_within_a_limit(name, share, solve):
 def test_irregular_meshes_are_certified(case):
     mesh = gc.TriangleMesh(case.vertices, case.faces)
     check(mesh, gc.exact_distance(mesh, 0))
+
+
+def spiky(rng):
+    """Terrain with spikes of up to a thousand times its size."""
+    vertices, faces = random_meshes.terrain(rng)
+    tips = rng.choice(len(vertices), 1 + len(vertices) // 10, replace=False)
+    vertices[tips, 2] += 10.0 ** rng.uniform(0, 3, len(tips))
+    return vertices, faces
+
+
+def needles(rng):
+    vertices, faces = random_meshes.ball(rng)
+    return zoo.needled(vertices, faces, int(rng.integers(2**31)))[:2]
+
+
+def soup(rng):
+    """Triangles between random points, which cross, and whose edges have many faces."""
+    points = rng.normal(size=(int(rng.integers(5, 40)), 3)) * 10.0 ** rng.uniform(-3, 0, 3)
+    count = int(rng.integers(3, 80))
+    return points, np.array([rng.choice(len(points), 3, replace=False) for _ in range(count)])
+
+
+@pytest.mark.jit
+@pytest.mark.parametrize(
+    "kind", [*random_meshes.KINDS, *random_meshes.IRREGULAR_KINDS, spiky, needles, soup]
+)
+@pytest.mark.parametrize("slice_", range(4))
+def test_random_meshes_are_certified(kind, slice_):
+    """Exact fields all of them; of approximate ones at least 95 %, which is what is promised."""
+    seeds, held = range(50 * slice_, 50 * (slice_ + 1)), 0
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        mesh = gc.TriangleMesh(*kind(rng))
+        points = random_points(mesh, 1 + seed % 3, seed=seed)
+        sources = [gc.Source(point, i * 0.2 * mesh.extent) for i, point in enumerate(points)]
+        limit = mesh.extent * rng.uniform(0.1, 1.0) if seed % 5 == 0 else np.inf
+        free = {point.face_index for point in points}
+        walls = [f for f in range(0, len(mesh.faces), 7) if f not in free and seed % 4 == 0]
+        options = {"max_distance": limit, "barriers": walls}
+        certificate = gc.exact_distance(mesh, sources, **options).certify()
+        assert certificate.holds, seed
+        assert certificate.relative_gap <= GAP, seed
+        held += gc.approximate_distance(mesh, sources, **options).certify().holds
+    assert held >= 0.95 * len(seeds)
 
 
 @pytest.mark.jit

@@ -144,3 +144,16 @@ def test_a_path_along_the_boundary_may_stray_by_rounding():
     field = gc.exact_distance(mesh, 146)
     for target in range(209, 441, 21):
         check_path(mesh, field.path_to(target), 146, target, field.distances[target])
+
+
+@pytest.mark.jit
+def test_a_path_between_many_sheets_around_a_tip_is_found():
+    """Its line may go through sheets in tens of thousands of ways: each place is tried once."""
+    rng = np.random.default_rng(114)
+    points = rng.normal(size=(int(rng.integers(5, 40)), 3)) * 10.0 ** rng.uniform(-3, 0, 3)
+    faces = [rng.choice(len(points), 3, replace=False) for _ in range(int(rng.integers(3, 80)))]
+    mesh = gc.TriangleMesh(points, faces)
+    source = gc.SurfacePoint.face(9, (0.1909981448964488, 0.26098535102994447, 0.5480165040736068))
+    field = gc.exact_distance(mesh, source)
+    for v in np.flatnonzero(np.isfinite(field.distances)).tolist():
+        assert field.path_to(v).length == pytest.approx(field.distances[v], rel=1e-12)

@@ -1,7 +1,7 @@
 // Borders and areas of territories: requested when the surface is coloured by them, then shown.
-import { askBorders, type BordersQuestion } from "../api/queries";
-import { askCells } from "../api/tools";
+import type { Question } from "geodesic-client";
 import type { Notes } from "../panel/notes";
+import { service } from "../service";
 import type { State } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
@@ -32,8 +32,10 @@ export class Borders {
     }
     const question = bordersOf(state);
     this.drawing.follow(JSON.stringify([mesh, question]), async (onProgress, signal) => {
-      const { borders, warnings } = await askBorders(mesh, question, onProgress, signal);
-      const cells = await askCells(mesh, question, { onProgress, signal });
+      const { sources, ...rest } = question;
+      const asked = { ...rest, onProgress, signal };
+      const { borders, warnings } = await service.borders(mesh, sources, asked);
+      const cells = await service.cells(mesh, sources, asked);
       return () => {
         this.sceneView.showBorders(nearest, borders);
         this.fields.tellAreas(cells.areas, state);
@@ -48,8 +50,8 @@ export class Borders {
   }
 }
 
-/** Return the body of a query for borders, which are exact by any method. */
-export function bordersOf(state: State): BordersQuestion {
+/** Return a question for borders, which are exact by any method. */
+export function bordersOf(state: State): Question<"borders"> {
   const { method: _, ...question } = questionOf({ ...state, slope: null, tolls: null }, "exact");
   return question;
 }

@@ -1,6 +1,6 @@
 // The boundary of the surface: requested when it is to be drawn.
-import { askBoundaries } from "../api/tools";
 import type { Notes } from "../panel/notes";
+import { service } from "../service";
 import type { State } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
@@ -24,8 +24,8 @@ export class Boundaries {
       return;
     }
     this.drawing.follow(mesh, async (onProgress, signal) => {
-      const lines = await askBoundaries(mesh, { onProgress, signal });
-      return () => this.sceneView.showBoundary(lines);
+      const { boundaries } = await service.boundaries(mesh, { onProgress, signal });
+      return () => this.sceneView.showBoundary(boundaries);
     });
   }
 

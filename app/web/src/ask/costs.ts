@@ -1,5 +1,5 @@
 // What ways cost, as the service takes it.
-import type { SurfaceCost } from "../api/tools";
+import type { SurfaceCost } from "geodesic-client";
 import { type State, unitOf } from "../state/state";
 
 /** Return what ways cost, or null where only their length counts. */

@@ -1,14 +1,21 @@
 // Distances to all vertices: requested when sources, method or limits change, then painted.
-import type { Field, Proof, Question } from "../api/queries";
-import { askDistances, askProof, askTerritories } from "../api/queries";
-import type { Certificate, Effort, ErrorBound, Method } from "../api/types";
+import type {
+  Call,
+  Certificate,
+  Distances,
+  Effort,
+  ErrorBound,
+  Method,
+  Question,
+} from "geodesic-client";
 import { byId, count, duration, written } from "../dom";
 import type { LoadedMesh } from "../mesh/loader";
 import type { FacePoint } from "../mesh/picking";
 import { extremesOf } from "../mesh/values";
 import type { Notes } from "../panel/notes";
+import { service } from "../service";
 import { nameOf, startsOf } from "../state/places";
-import { type Shade, type State, unitOf, type Values } from "../state/state";
+import { INITIAL, type Shade, type State, unitOf } from "../state/state";
 import { PATIENCE_MS, type Status } from "../status";
 import { huesOf } from "../view/hues";
 import {
@@ -22,6 +29,22 @@ import {
 import type { SceneView } from "../view/sceneView";
 import type { Surface } from "../view/surface";
 import { costKey, costOf, hasCost, measureOf } from "./costs";
+import { LatestOnly } from "./latestOnly";
+
+/** Distances to all vertices, infinite where unreachable. */
+export interface Field extends Distances {
+  largest: number;
+}
+
+/** What proves the distances of a field. */
+interface Proof {
+  certificate: Certificate;
+  /** By how much each face widens the gap at most, in mesh units. */
+  violations: Float64Array;
+}
+
+/** Faces from which exact distances take noticeably longer than fast ones. */
+const MANY_FACES = 50_000;
 
 /** Answers for one set of sources, barriers, limit and cost. Of costs there is one method only. */
 interface Answers {
@@ -29,6 +52,8 @@ interface Answers {
   exact?: Field;
   approximate?: Field;
   fast?: Field;
+  /** Fast distances of least effort, shown until those that were asked for are there. */
+  rough?: Field;
   /** The error allowed in ``approximate``, and the effort of ``fast``. */
   error?: number;
   effort?: Effort;
@@ -38,115 +63,182 @@ interface Answers {
   proofs: Partial<Record<Method, Proof>>;
 }
 
+/** A state that asks for distances. */
+type Asked = State & { mesh: string };
+
 export class Fields {
   /** Called when the colours have changed. */
   onPaint: (state: State) => void = () => undefined;
   private answers: Answers = { key: "", proofs: {} };
   private requested = "";
-  private stop = new AbortController();
+  private state: State = INITIAL;
+  private latest: Asked | null = null;
+  private clearing = 0;
+  private readonly latestOnly: LatestOnly<Asked>;
 
   constructor(
-    private readonly status: Status,
+    status: Status,
     private readonly sceneView: SceneView,
     private readonly notes: Notes,
-  ) {}
+  ) {
+    this.latestOnly = new LatestOnly<Asked>(
+      (asked, stop) =>
+        status.during("busy", "Computing distances…", stop, (onProgress) =>
+          this.answer(asked, { onProgress, signal: stop.signal }),
+        ),
+      (error) => status.fail(error),
+    );
+  }
 
-  /** Return the field that is drawn, or null. */
+  /** Return the field that was asked for, once it is there. */
   of(state: State): Field | null {
-    return isAsked(state) ? (this.answers[methodOf(state)] ?? null) : null;
+    return isAsked(state) ? (this.answersTo(state)[methodOf(state)] ?? null) : null;
+  }
+
+  /** Return the field that is drawn: a rough one until then. */
+  private shown(state: State): Field | null {
+    return this.of(state) ?? (isAsked(state) ? (this.answersTo(state).rough ?? null) : null);
+  }
+
+  /** Return the answers that are there, without those for another error or effort. */
+  private answersTo(state: State): Answers {
+    const key = keyOf(state);
+    const { answers } = this;
+    if (key !== answers.key) return { key, proofs: {} };
+    if (state.error !== answers.error) {
+      delete answers.approximate;
+      delete answers.proofs.approximate;
+    }
+    if (state.effort !== answers.effort) delete answers.fast;
+    return answers;
   }
 
   /** Return the nearest source of each vertex, where it is drawn; else null. */
   territories(state: State): Int32Array | null {
-    return shadeOf(state) === "territories" ? (this.answers.nearest ?? null) : null;
+    return shadeOf(state) === "territories" ? (this.answersTo(state).nearest ?? null) : null;
+  }
+
+  /** Return the numbers that colour the surface, with the ends of their scale; null: none. */
+  scale(state: State): Scale | null {
+    const field = this.of(state);
+    return state.values || field ? scaleOf(state, field) : null;
   }
 
   /** Tell the areas of the territories that are drawn. */
   tellAreas(areas: number[], state: State): void {
-    this.answers.areas = areas;
-    this.showTerritories(state);
+    const answers = this.answersTo(state);
+    answers.areas = areas;
+    this.showTerritories(state, answers);
   }
 
   /** Request what ``state`` needs and has not been answered yet, and paint it. */
   follow(state: State): void {
-    const { mesh, barriers, maxDistance, error, effort } = state;
-    const sources = isAsked(state) ? startsOf(state) : [];
-    const asks = [mesh, sources, barriers, maxDistance, costKey(state)];
-    const asked = [...asks, methodOf(state), error, effort, shadeOf(state), versusOf(state)];
+    this.state = state;
+    const { mesh, error, effort } = state;
+    const asked = [keyOf(state), methodOf(state), error, effort, shadeOf(state), versusOf(state)];
     const requested = JSON.stringify(asked);
     if (requested === this.requested) return;
     this.requested = requested;
-    this.stop.abort();
-    this.stop = new AbortController();
-    const key = JSON.stringify(asks);
-    if (key !== this.answers.key) this.answers = { key, proofs: {} };
-    if (error !== this.answers.error) {
-      delete this.answers.approximate;
-      delete this.answers.proofs.approximate;
+    const isQuestion = mesh !== null && isAsked(state) && startsOf(state).length > 0;
+    this.latest = isQuestion ? { ...state, mesh } : null;
+    if (this.latest) {
+      this.latestOnly.ask(this.latest);
+      // Until the answer is there, the one before remains for a moment only.
+      this.clearing ||= setTimeout(() => this.paint(this.state), PATIENCE_MS);
+    } else {
+      this.latestOnly.cancel();
+      this.paint(state);
     }
-    if (effort !== this.answers.effort) delete this.answers.fast;
-    if (!mesh || sources.length === 0) this.paint(state);
-    else this.request(mesh, state);
   }
 
-  private request(mesh: string, state: State): void {
-    const stop = new AbortController();
-    this.stop = stop;
-    const isLatest = (): boolean => this.stop === stop;
-    // Until the answer is there, the one before remains for a moment only.
-    const clearing = setTimeout(() => isLatest() && this.paint(state), PATIENCE_MS);
-    this.status.run("busy", "Computing distances…", stop, async (onProgress) => {
-      try {
-        await this.fetchMissing(mesh, state, onProgress, stop.signal);
-      } catch (failure) {
-        // After a failure or an abort, the same request may be made again.
-        if (isLatest()) this.requested = "";
-        throw failure;
-      } finally {
-        clearTimeout(clearing);
-        if (isLatest()) this.paint(state);
+  private async answer(asked: Asked, call: Call & { signal: AbortSignal }): Promise<void> {
+    const answers = this.answersTo(asked);
+    try {
+      if (this.takesLong(asked, answers)) {
+        const { sources, ...question } = questionOf({ ...asked, effort: 1 }, "fast");
+        answers.rough = fieldOf(
+          await service.distances(asked.mesh, sources, { ...question, ...call }),
+        );
+        this.show(answers, asked);
+        if (!this.latestOnly.refines()) return;
       }
-    });
+      await this.fetchMissing(answers, asked, call);
+      this.show(answers, asked);
+    } catch (failure) {
+      if (asked === this.latest) {
+        // After a failure or an abort, the same request may be made again.
+        this.requested = "";
+        delete answers.rough;
+        this.paint(this.state);
+      }
+      throw failure;
+    }
   }
 
-  private async fetchMissing(
-    mesh: string,
-    state: State,
-    onProgress: (share: number) => void,
-    signal: AbortSignal,
-  ): Promise<void> {
-    const { answers } = this;
+  /** Whether a rough answer is worth while. */
+  private takesLong(asked: Asked, answers: Answers): boolean {
+    const { method } = asked;
+    const shade = shadeOf(asked);
+    const faces = this.sceneView.mesh?.document.faces ?? 0;
+    const isPlain = shade === "distance" || shade === "territories";
+    const isQuick = method === "fast" || hasCost(asked); // of costs there is no rough answer
+    return faces >= MANY_FACES && isPlain && !isQuick && !answers[method];
+  }
+
+  /** Paint answers, also those for points that have been pulled on meanwhile, for a moment. */
+  private show(answers: Answers, asked: Asked): void {
+    const { surface, mesh } = this.sceneView;
+    if (keyOf(asked) === keyOf(this.state)) {
+      this.answers = answers;
+      this.paint(this.state);
+    } else if (isPulled(asked, this.state) && surface && mesh) {
+      const field = answers[methodOf(asked)] ?? answers.rough;
+      blank(surface);
+      if (field) this.paintField(surface, mesh, field, asked, answers);
+      clearTimeout(this.clearing);
+      this.clearing = setTimeout(() => this.paint(this.state), PATIENCE_MS);
+      this.onPaint(this.state);
+      this.sceneView.stage.invalidate();
+    }
+  }
+
+  private async fetchMissing(answers: Answers, state: Asked, call: Call): Promise<void> {
+    const { mesh } = state;
     const shade = shadeOf(state);
-    const method = methodOf(state);
-    const methods = shade === "difference" ? [method, versusOf(state)] : [method];
+    const asked = methodOf(state);
+    const methods = shade === "difference" ? [asked, versusOf(state)] : [asked];
     for (const method of methods) {
       if (answers[method]) continue;
-      answers[method] = await askDistances(mesh, questionOf(state, method), onProgress, signal);
+      const { sources, ...question } = questionOf(state, method);
+      answers[method] = fieldOf(await service.distances(mesh, sources, { ...question, ...call }));
       if (method === "approximate") answers.error = state.error;
       if (method === "fast") answers.effort = state.effort;
     }
     if (shade === "territories") {
       // Borders are exact in any case.
-      answers.nearest ??= await askTerritories(mesh, questionOf(state, "exact"), signal);
+      answers.nearest ??= await askTerritories(mesh, questionOf(state, "exact"), call);
     }
     if (shade === "proof" && state.method !== "fast") {
       const question = questionOf(state, state.method);
-      answers.proofs[state.method] ??= await askProof(mesh, question, onProgress, signal);
+      answers.proofs[state.method] ??= await askProof(mesh, question, call);
     }
   }
 
   /** Paint the answers that are there; a mesh without any stays grey. */
   paint(state: State): void {
+    clearTimeout(this.clearing);
+    this.clearing = 0;
     const { surface, mesh } = this.sceneView;
-    const field = this.of(state);
-    this.compare();
+    const field = this.shown(state);
+    this.compare(this.answersTo(state));
     if (!surface || !mesh) return;
-    surface.setTerritories(null);
-    showProof(null);
-    showDifference(null);
+    blank(surface);
     this.notes.tell("distances", field ? notesOn(field, state) : []);
-    if (state.values) this.paintValues(surface, state.values, state);
-    else if (field) this.paintField(surface, mesh, field, state);
+    if (state.values) {
+      const { values, least, largest } = scaleOf(state, null);
+      surface.setValues(values, largest, least);
+      showScale(state.values.name, largest, least);
+    } else if (field) this.paintField(surface, mesh, field, state, this.answers);
     else {
       surface.setValues(null, 1);
       hideLegend();
@@ -155,19 +247,18 @@ export class Fields {
     this.sceneView.stage.invalidate();
   }
 
-  private paintValues(surface: Surface, { name, numbers }: Values, state: State): void {
-    const [low, high] = extremesOf(numbers);
-    const [least, largest] = [state.least ?? low, state.range ?? high];
-    surface.setValues(numbers, largest, least);
-    showScale(name, largest, least);
-  }
-
-  private paintField(surface: Surface, mesh: LoadedMesh, field: Field, state: State): void {
+  private paintField(
+    surface: Surface,
+    mesh: LoadedMesh,
+    field: Field,
+    state: State,
+    answers: Answers,
+  ): void {
     const shade = shadeOf(state);
-    const { nearest } = this.answers;
+    const { nearest } = answers;
     const method = methodOf(state);
-    const other = this.answers[versusOf(state)];
-    const proof = this.answers.proofs[method];
+    const other = answers[versusOf(state)];
+    const proof = answers.proofs[method];
     showProof(proof && !hasCost(state) ? proofInWords(proof.certificate) : null);
     if (shade === "proof" && proof) {
       const violations = atVertices(proof.violations, mesh);
@@ -185,22 +276,22 @@ export class Fields {
       );
       return;
     }
-    const [least, largest] = [state.least ?? 0, state.range ?? field.largest];
-    surface.setValues(field.distances, largest, least);
+    const { values, least, largest } = scaleOf(state, field);
+    surface.setValues(values, largest, least);
     if (shade === "territories" && nearest) {
       const hues = huesOf(state.starts, nearest, mesh);
       this.sceneView.hues = hues;
       surface.setTerritories(nearest.map((source) => hues[source] ?? source));
-      this.sceneView.showPoints(state);
-      this.showTerritories(state);
+      this.sceneView.showPoints(this.state);
+      this.showTerritories(state, answers);
     } else {
-      const what = hasCost(state) ? "Cost" : method === "fast" ? "Rough distance" : "Distance";
+      const isRough = method === "fast" || field === answers.rough;
+      const what = hasCost(state) ? "Cost" : isRough ? "Rough distance" : "Distance";
       showScale(`${what} in ${measureOf(state)}`, largest, least);
     }
   }
 
-  private showTerritories(state: State): void {
-    const { areas } = this.answers;
+  private showTerritories(state: State, { areas }: Answers): void {
     const whole = areas?.reduce((sum, area) => sum + area, 0) ?? 0;
     showTerritories(
       Array.from({ length: state.starts }, (_, i) => {
@@ -217,7 +308,7 @@ export class Fields {
 
   /** Tell the distance at a point, interpolated within its face; null: nowhere. */
   tell(point: FacePoint | null, state: State): void {
-    const numbers = state.values?.numbers ?? this.of(state)?.distances;
+    const numbers = state.values?.numbers ?? this.shown(state)?.distances;
     const mesh = this.sceneView.mesh;
     const isTold = point && numbers && mesh && !["difference", "proof"].includes(shadeOf(state));
     const value = isTold
@@ -230,18 +321,82 @@ export class Fields {
   }
 
   /** Show time and error of all methods side by side. */
-  private compare(): void {
-    const { exact, approximate, fast } = this.answers;
+  private compare({ exact, approximate, fast }: Answers): void {
     byId("time-exact").textContent = timeOf(exact);
     byId("bound-exact").textContent = exact ? "0" : "–";
     byId("measured-exact").textContent = exact && (approximate ?? fast) ? "0" : "–";
     for (const [method, rough] of Object.entries({ approximate, fast })) {
       byId(`time-${method}`).textContent = timeOf(rough);
-      byId(`bound-${method}`).textContent = rough ? percent(rough.bound.value) : "–";
+      byId(`bound-${method}`).textContent = rough ? percent(rough.error_bound.value) : "–";
       byId(`measured-${method}`).textContent =
         exact && rough ? percent(largestOf(errorsOf(exact, rough)) / 100) : "–";
     }
   }
+}
+
+/** Numbers of the vertices, and those of the first and the last colour. */
+export interface Scale {
+  values: Float64Array;
+  least: number;
+  largest: number;
+}
+
+/** Return the scale of the values of a file where there are some, otherwise of a field. */
+function scaleOf({ values, least, range }: State, field: Field | null): Scale {
+  const numbers = values?.numbers ?? field?.distances ?? new Float64Array();
+  const [low, high] = values ? extremesOf(values.numbers) : [0, field?.largest ?? 0];
+  return { values: numbers, least: least ?? low, largest: range ?? high };
+}
+
+/** Take territories, proof and difference away. */
+function blank(surface: Surface): void {
+  surface.setTerritories(null);
+  showProof(null);
+  showDifference(null);
+}
+
+export function fieldOf(answer: Distances): Field {
+  const reached = answer.distances.filter((distance) => distance < Infinity);
+  return { ...answer, largest: largestOf(reached) };
+}
+
+/** Prove the distances from the sources of a question. */
+export async function askProof(
+  mesh: string,
+  { sources, ...question }: FieldQuestion,
+  call: Call,
+): Promise<Proof> {
+  const asked = { ...question, certify: true, include: ["violations" as const], ...call };
+  const { certificate, violations } = await service.distances(mesh, sources, asked);
+  if (!certificate || !violations) throw new Error("The service returned no proof.");
+  return { certificate, violations };
+}
+
+/** Return the index of the nearest source of each vertex, -1 where there is none. */
+async function askTerritories(
+  mesh: string,
+  { sources, ...question }: FieldQuestion,
+  call: Call,
+): Promise<Int32Array> {
+  const asked = { ...question, include: ["nearest_source" as const], ...call };
+  return (await service.distances(mesh, sources, asked)).nearest_source ?? new Int32Array();
+}
+
+/** Return what answers belong to. */
+function keyOf(state: State): string {
+  const { mesh, barriers, maxDistance } = state;
+  const sources = isAsked(state) ? startsOf(state) : [];
+  return JSON.stringify([mesh, sources, barriers, maxDistance, costKey(state)]);
+}
+
+/** Whether two states ask for distances that differ by where the sources are at most. */
+function isPulled(before: State, now: State): boolean {
+  const fixed = (state: State): string => {
+    const { mesh, barriers, maxDistance, starts } = state;
+    const colours = [methodOf(state), shadeOf(state), versusOf(state), costKey(state)];
+    return JSON.stringify([mesh, barriers, maxDistance, starts, colours]);
+  };
+  return isAsked(now) && startsOf(now).length > 0 && fixed(before) === fixed(now);
 }
 
 function isAsked({ distances, isReadable, values }: State): boolean {
@@ -257,19 +412,24 @@ function methodOf(state: State): Method {
   return hasCost(state) ? "exact" : state.method;
 }
 
-/** Return the body of a query for distances, or for costs. */
-export function questionOf(state: State, method: Method): Question {
+type FieldQuestion<M extends Method = Method> = Pick<
+  Question<"distances">,
+  "sources" | "relativeError" | "effort" | "maxDistance" | "barriers" | "cost"
+> & { method?: M };
+
+/** Return a question for distances, or for costs: of these there is no other method. */
+export function questionOf<M extends Method>(state: State, method: M): FieldQuestion<M> {
+  const sources = startsOf(state);
   const cost = costOf(state);
-  const sources = startsOf(state) as Question["sources"];
   if (cost) {
     return { sources, cost, ...(state.barriers.length > 0 ? { barriers: state.barriers } : {}) };
   }
   return {
     sources,
     method,
-    ...(method === "approximate" ? { relative_error: state.error } : {}),
+    ...(method === "approximate" ? { relativeError: state.error } : {}),
     ...(method === "fast" ? { effort: state.effort } : {}),
-    ...(state.maxDistance === null ? {} : { max_distance: state.maxDistance }),
+    ...(state.maxDistance === null ? {} : { maxDistance: state.maxDistance }),
     ...(state.barriers.length > 0 ? { barriers: state.barriers } : {}),
   };
 }
@@ -281,17 +441,18 @@ export function versusOf({ method, versus }: State): Method {
 }
 
 /** Return what there is to know about a field but its colours. */
-function notesOn({ bound, unreachable, warnings }: Field, state: State): string[] {
+function notesOn({ error_bound, unreachable, warnings }: Field, state: State): string[] {
   const { method, shade } = state;
   const { disconnected, beyond_max_distance } = unreachable;
+  const isExact = method === "exact" && error_bound.value === 0;
   const said = (n: number, what: string): string[] =>
     n > 0 ? [`${count(n, "vertex", "vertices")} ${what}`] : [];
   return [
     ...(hasCost(state)
-      ? [`Costs: ${boundInWords(bound)}.`]
-      : method === "exact"
+      ? [`Costs: ${boundInWords(error_bound)}.`]
+      : isExact
         ? []
-        : [`Distances: ${boundInWords(bound)}.`]),
+        : [`Distances: ${boundInWords(error_bound)}.`]),
     ...(shade === "proof" && method === "fast"
       ? ["Fast distances have no proof: choose another method."]
       : []),
@@ -315,7 +476,7 @@ export function proofInWords(
 }
 
 /** Return at each vertex the largest value of its faces. */
-function atVertices(ofFaces: number[], mesh: LoadedMesh): Float64Array {
+function atVertices(ofFaces: Float64Array, mesh: LoadedMesh): Float64Array {
   const largest = new Float64Array(mesh.document.vertices);
   for (const [face, value] of ofFaces.entries()) {
     for (const vertex of mesh.corners(face)) {

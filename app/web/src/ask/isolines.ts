@@ -1,8 +1,8 @@
 // Isolines: requested when the field or the levels change, then drawn.
-import { askIsolines, type IsolinesQuestion } from "../api/queries";
-import { askLevelSets } from "../api/tools";
+import type { Isoline, IsolinesAnswer, Question, Source } from "geodesic-client";
 import { extremesOf } from "../mesh/values";
 import type { Notes } from "../panel/notes";
+import { service } from "../service";
 import type { Lines, State, Values } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
@@ -11,6 +11,8 @@ import { Drawing } from "./drawing";
 import { boundInWords, type Fields, questionOf, shadeOf } from "./fields";
 
 export class Isolines {
+  /** The lines that are drawn. */
+  lines: Isoline[] = [];
   private readonly drawing: Drawing;
   /** Called when lines are drawn, or none any more. */
   onDraw: () => void = () => undefined;
@@ -21,10 +23,7 @@ export class Isolines {
     private readonly fields: Fields,
     private readonly notes: Notes,
   ) {
-    this.drawing = new Drawing(status, notes, "isolines", () => {
-      sceneView.showIsolines([]);
-      this.onDraw();
-    });
+    this.drawing = new Drawing(status, notes, "isolines", () => this.show([]));
   }
 
   /** Request the isolines that `state` needs and that are not drawn yet, and draw them. */
@@ -39,18 +38,18 @@ export class Isolines {
     // Where nothing but the sources is reached, there is no line.
     const question =
       isDrawn && field && field.largest > 0 ? isolinesOf(state, lines, field.largest) : null;
-    const isEmpty = question && "levels" in question && question.levels.length === 0;
+    const isEmpty = question?.levels?.length === 0;
     if (!mesh || !question || isEmpty) {
       this.drawing.clear();
       return;
     }
     const asked = JSON.stringify([mesh, question, state.method]);
     this.drawing.follow(asked, async (onProgress, signal) => {
-      const answer = await askIsolines(mesh, question, onProgress, signal);
+      const { sources, ...rest } = question;
+      const answer = await service.isolines(mesh, sources, { ...rest, onProgress, signal });
       const isOfOtherMethod = !hasCost(state) && answer.method !== state.method;
       return () => {
-        this.sceneView.showIsolines(answer.isolines);
-        this.onDraw();
+        this.show(answer.isolines);
         this.notes.tell("isolines", [
           ...(isOfOtherMethod ? [`Isolines: ${boundInWords(answer.error_bound)}.`] : []),
           ...answer.warnings,
@@ -59,21 +58,30 @@ export class Isolines {
     });
   }
 
-  private followValues(mesh: string, values: Values, lines: NonNullable<Lines>): void {
-    const question = levelSetsOf(values, lines);
-    if ("levels" in question && question.levels.length === 0) {
+  private followValues(mesh: string, of: Values, lines: NonNullable<Lines>): void {
+    const { values, ...question } = levelSetsOf(of, lines);
+    if (question.levels?.length === 0) {
       this.drawing.clear();
       return;
     }
-    const asked = JSON.stringify([mesh, values.key, lines]);
+    const asked = JSON.stringify([mesh, of.key, lines]);
     this.drawing.follow(asked, async (onProgress, signal) => {
-      const { isolines, warnings } = await askLevelSets(mesh, question, { onProgress, signal });
+      const { isolines, warnings } = await service.isolines(mesh, values, {
+        ...question,
+        onProgress,
+        signal,
+      });
       return () => {
-        this.sceneView.showIsolines(isolines);
-        this.onDraw();
+        this.show(isolines);
         this.notes.tell("isolines", warnings);
       };
     });
+  }
+
+  private show(levels: IsolinesAnswer["isolines"]): void {
+    this.lines = levels.flatMap(({ lines }) => lines);
+    this.sceneView.showIsolines(levels);
+    this.onDraw();
   }
 
   /** Draw them again on a mesh that has been opened anew. */
@@ -82,12 +90,12 @@ export class Isolines {
   }
 }
 
-/** Return the body of a query for the level sets of values. */
+/** Return a question for the level sets of values, and these: NaN where there is none. */
 export function levelSetsOf(
   { numbers }: Values,
   lines: NonNullable<Lines>,
-): { values: (number | null)[] } & ({ count: number } | { levels: number[] }) {
-  const values = Array.from(numbers, (x) => (Number.isFinite(x) ? x : null));
+): { values: Float64Array; count?: number; levels?: number[] } {
+  const values = numbers.map((x) => (Number.isFinite(x) ? x : Number.NaN));
   if ("count" in lines) return { values, count: lines.count };
   const { spacing } = lines;
   const [least, largest] = extremesOf(numbers);
@@ -96,7 +104,9 @@ export function levelSetsOf(
   return { values, levels: Array.from({ length: count }, (_, i) => (first + i) * spacing) };
 }
 
-/** Return the body of a query for isolines, up to the largest distance. */
+type IsolinesQuestion = Question<"isolines"> & { sources: Source[] };
+
+/** Return a question for isolines, up to the largest distance. */
 export function isolinesOf(
   state: State,
   lines: NonNullable<Lines>,

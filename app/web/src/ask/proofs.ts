@@ -1,16 +1,16 @@
 // The badge of a path: the proof that no other is shorter.
-import { pointOf } from "../api/queries";
-import { askPathProof } from "../api/tools";
-import type { Outline, Point } from "../api/types";
+import type { PathAnswer } from "geodesic-client";
 import { byId } from "../dom";
 import type { LoadedMesh } from "../mesh/loader";
+import { service } from "../service";
 import { endOf, placedAt, stopsOf } from "../state/places";
+import { type Point, pointOf } from "../state/point";
 import type { Store } from "../state/state";
 import type { Status } from "../status";
 import { proofInWords } from "./fields";
 
 export class PathProofs {
-  private outline: Outline | null = null;
+  private outline: PathAnswer | null = null;
   /** Whether the path that comes next is to be proved. */
   private isNext = false;
   private stop = new AbortController();
@@ -26,7 +26,7 @@ export class PathProofs {
   }
 
   /** Show the proof of no other path than the one that is drawn. */
-  follow(outline: Outline | null): void {
+  follow(outline: PathAnswer | null): void {
     if (outline === this.outline) return;
     this.outline = outline;
     this.stop.abort();
@@ -67,15 +67,16 @@ export class PathProofs {
     return corners[nearest] ?? corners[0];
   }
 
-  private run(outline: Outline, source: Point, target: Point): void {
+  private run(outline: PathAnswer, source: Point, target: Point): void {
     const { mesh, barriers } = this.store.state;
     if (!mesh) return;
     this.stop = new AbortController();
     const { signal } = this.stop;
     this.status.run("drawing", "Proving the path…", this.stop, async (onProgress) => {
-      const question = { source, target, barriers };
-      const certificate = await askPathProof(mesh, question, { onProgress, signal });
+      const call = { barriers, certify: true, onProgress, signal };
+      const { certificate } = await service.path(mesh, source, target, call);
       if (outline !== this.outline) return;
+      if (!certificate) throw new Error("The service returned no proof.");
       this.badge.hidden = false;
       this.badge.textContent = proofInWords(certificate, "its length");
     });

@@ -1,9 +1,10 @@
 // The rays of a polar grid: straight lines from each source, as far as they are shortest paths.
-import { askDistancesOf, askTotalAngle, askTrace, pointOf } from "../api/queries";
-import type { Point, StraightLine } from "../api/types";
+import type { StraightLine } from "geodesic-client";
 import { differences } from "../mesh/frame";
 import type { Notes } from "../panel/notes";
+import { service } from "../service";
 import { startsOf } from "../state/places";
+import { type Point, pointOf } from "../state/point";
 import type { State } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
@@ -41,22 +42,24 @@ export class Rays {
     }
     const question = questionOf(state, "exact");
     this.drawing.follow(JSON.stringify([mesh, question]), async (_onProgress, signal) => {
-      const angles = await Promise.all(
-        sources.map((source) => askTotalAngle(mesh, source, barriers, signal)),
+      const around = await Promise.all(
+        sources.map((source) => service.logMap(mesh, source, { barriers, maxDistance: 0, signal })),
       );
-      const traced = await askTrace(
+      const { lines: traced } = await service.trace(
         mesh,
-        {
-          starts: sources.flatMap((source) => Array<Point>(RAYS).fill(source)),
-          directions: angles.flatMap(evenly),
-          lengths: [largest],
-          barriers,
-        },
-        signal,
+        sources.flatMap((source) => Array<Point>(RAYS).fill(source)),
+        around.flatMap(({ total_angle }) => evenly(total_angle)),
+        [largest],
+        { barriers, signal },
       );
-      const counts = await shortestParts(traced, ROUNDING * largest, (points) =>
-        askDistancesOf(mesh, question, points, signal),
-      );
+      const counts = await shortestParts(traced, ROUNDING * largest, async (targets) => {
+        const { distances } = await service.distances(mesh, sources, {
+          ...question,
+          targets,
+          signal,
+        });
+        return distances;
+      });
       return () =>
         this.sceneView.showRays(
           traced.map(({ points, faces }, i) => ({
@@ -100,7 +103,7 @@ interface Part {
 export async function shortestParts(
   lines: Pick<StraightLine, "points" | "locations">[],
   tolerance: number,
-  askDistances: (points: Point[]) => Promise<number[]>,
+  askDistances: (points: Point[]) => Promise<ArrayLike<number>>,
 ): Promise<number[]> {
   const parts = lines.map((line): Part => {
     const passed = passedBy(line);

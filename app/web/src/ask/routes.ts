@@ -1,20 +1,26 @@
 // The path to the target, which follows the pointer: fast at first, and the shortest once the
 // pointer rests. And the steps of its search.
-import { LatestOnly } from "../api/latestOnly";
-import { askRoute, askSteps, pointOf, type RouteQuestion } from "../api/queries";
-import { askCheapest, type SurfaceCost } from "../api/tools";
-import type { Outline, Point, Step } from "../api/types";
+import type { PathAnswer, Step, SurfaceCost } from "geodesic-client";
 import { byId, count, written } from "../dom";
 import { InputError } from "../inputError";
 import { differences } from "../mesh/frame";
 import type { Notes } from "../panel/notes";
+import { service } from "../service";
 import { endOf, nameOf, startsOf, stopsOf } from "../state/places";
-import { writePoint } from "../state/point";
+import { type Point, pointOf, writePoint } from "../state/point";
 import { type State, unitOf } from "../state/state";
 import { PATIENCE_MS, type Status } from "../status";
 import type { SceneView } from "../view/sceneView";
 import { costKey, costOf, measureOf } from "./costs";
 import { boundInWords } from "./fields";
+import { LatestOnly } from "./latestOnly";
+
+export interface RouteQuestion {
+  sources: Point[];
+  target: Point;
+  waypoints: Point[];
+  barriers: number[];
+}
 
 type RouteRequest = RouteQuestion & { mesh: string; cost: SurfaceCost | null };
 
@@ -28,9 +34,9 @@ const WORDS: Record<Step["name"], string> = {
 };
 
 export class Routes {
-  outline: Outline | null = null;
+  outline: PathAnswer | null = null;
   /** Called when another path, or none, is drawn. */
-  onDraw: (outline: Outline | null) => void = () => undefined;
+  onDraw: (outline: PathAnswer | null) => void = () => undefined;
   private requested = "";
   private unit = "";
   private measure = "";
@@ -115,11 +121,14 @@ export class Routes {
   private async answer(request: RouteRequest, signal: AbortSignal): Promise<void> {
     const { mesh, cost, ...question } = request;
     try {
-      const isOld = () => request !== this.request;
-      if (cost) this.show(await cheapest(mesh, question, cost, signal), request);
-      else
-        for await (const outline of askRoute(mesh, question, signal, isOld))
-          this.show(outline, request);
+      if (cost) {
+        this.show(await cheapest(mesh, question, cost, signal), request);
+        return;
+      }
+      const refines = () => this.latestOnly.refines();
+      for await (const outline of askRoute(mesh, question, signal, refines)) {
+        this.show(outline, request);
+      }
     } catch (failure) {
       // After a failure or an abort, the same request may be made again.
       if (request === this.request) this.requested = "";
@@ -127,7 +136,7 @@ export class Routes {
     }
   }
 
-  private show(outline: Outline, request: RouteRequest): void {
+  private show(outline: PathAnswer, request: RouteRequest): void {
     if (!this.request || !isPulled(request, this.request)) return;
     clearTimeout(this.clearing);
     this.clearing = 0;
@@ -146,11 +155,12 @@ export class Routes {
   private note(): void {
     const { outline, unit } = this;
     if (!outline) return;
-    const bound = outline.method === "exact" ? "exact" : boundInWords(outline.error_bound);
+    const isExact = outline.method === "exact";
+    const error = boundInWords(outline.error_bound);
     const words =
       outline.cost == null
-        ? `${unit}, ${bound}; ${written(straight(outline), 6)} straight`
-        : `${this.measure}, ${bound}; ${written(outline.length ?? 0, 6)} ${unit} long`;
+        ? `${unit}, ${isExact ? "exact" : `rough: ${error}`}; ${written(straight(outline), 6)} straight`
+        : `${this.measure}, ${isExact ? "exact" : error}; ${written(outline.length ?? 0, 6)} ${unit} long`;
     byId("length-note").textContent = outline.length == null ? reason(outline) : words;
     byId("length-names").textContent = this.names.join(" → ");
   }
@@ -161,7 +171,10 @@ export class Routes {
     const { mesh, cost: _, ...question } = request;
     const stop = new AbortController();
     this.status.run("busy", "Searching step by step…", stop, async () => {
-      const steps = await askSteps(mesh, question, stop.signal);
+      const { target, waypoints, barriers } = question;
+      const source = await nearestSource(mesh, question, stop.signal);
+      const call = { waypoints, barriers, signal: stop.signal };
+      const { steps } = await service.pathSteps(mesh, source, target, call);
       if (request !== this.request) return;
       this.steps = steps;
       byId("explain-start").hidden = true;
@@ -198,7 +211,7 @@ export class Routes {
 }
 
 /** Return how far the ends of a path are apart in space. */
-function straight({ points }: Outline): number {
+function straight({ points }: PathAnswer): number {
   const [first, last] = [points?.at(0), points?.at(-1)];
   return first && last ? Math.hypot(...differences(last, first)) : 0;
 }
@@ -209,7 +222,7 @@ async function cheapest(
   { sources, target, waypoints, barriers }: RouteQuestion,
   cost: SurfaceCost,
   signal: AbortSignal,
-): Promise<Outline> {
+): Promise<PathAnswer> {
   if (waypoints.length > 0) {
     throw new InputError(
       "No stops on the cheapest path",
@@ -217,11 +230,49 @@ async function cheapest(
       "Remove the stops, or the cost.",
     );
   }
+  const call = { barriers, cost, signal };
   const found = await Promise.all(
-    sources.map((source) => askCheapest(mesh, { source, target, barriers, cost }, signal)),
+    sources.map((source) => service.path(mesh, source, target, call)),
   );
-  const costFrom = ({ cost: each }: Outline): number => each ?? Infinity;
+  const costFrom = ({ cost: each }: PathAnswer): number => each ?? Infinity;
   return found.reduce((best, each) => (costFrom(each) < costFrom(best) ? each : best));
+}
+
+/**
+ * Yield a fast path, then the shortest, unless there is a newer question by then; of several
+ * sources, both start at the nearest.
+ */
+export async function* askRoute(
+  mesh: string,
+  question: RouteQuestion,
+  signal: AbortSignal,
+  refines: () => boolean,
+): AsyncGenerator<PathAnswer> {
+  const { target, waypoints, barriers } = question;
+  const source = await nearestSource(mesh, question, signal);
+  for (const method of ["fast", "exact"] as const) {
+    if (method === "exact" && !refines()) return;
+    yield await service.path(mesh, source, target, { waypoints, barriers, method, signal });
+  }
+}
+
+/** Return the source that is nearest to where a path goes first; the first where none has a way. */
+async function nearestSource(
+  mesh: string,
+  { sources, target, waypoints, barriers }: RouteQuestion,
+  signal: AbortSignal,
+): Promise<Point> {
+  let nearest = 0;
+  if (sources.length > 1) {
+    const { nearest_source } = await service.distances(mesh, sources, {
+      targets: [waypoints[0] ?? target],
+      barriers,
+      include: ["nearest_source"],
+      signal,
+    });
+    nearest = Math.max(0, nearest_source?.[0] ?? 0);
+  }
+  return sources[nearest] as Point;
 }
 
 /** Whether two requests differ by the points of the path after its start at most. */
@@ -231,7 +282,7 @@ function isPulled(before: RouteRequest, now: RouteRequest): boolean {
   return fixed(before) === fixed(now) && (before.cost === null) === (now.cost === null);
 }
 
-function reason({ reason: code }: Outline): string {
+function reason({ reason: code }: PathAnswer): string {
   if (code === "disconnected") return "start and end are not connected";
   return code === "beyond_max_cost"
     ? "the end costs more than the limit"

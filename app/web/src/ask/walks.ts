@@ -1,15 +1,21 @@
 // The straight line from the first source in a direction, which follows the pointer.
-import { LatestOnly } from "../api/latestOnly";
-import { askTrace, type TraceQuestion } from "../api/queries";
-import type { StraightLine } from "../api/types";
+import type { StraightLine } from "geodesic-client";
 import { written } from "../dom";
 import type { Notes } from "../panel/notes";
+import { service } from "../service";
 import { startsOf } from "../state/places";
+import type { Point } from "../state/point";
 import { type State, unitOf } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
+import { LatestOnly } from "./latestOnly";
 
-type WalkRequest = TraceQuestion & { mesh: string };
+interface WalkRequest {
+  mesh: string;
+  start: Point;
+  direction: [number, number, number];
+  barriers: number[];
+}
 
 const ENDS: Record<StraightLine["stopped"], string> = {
   length: "as long as it was drawn",
@@ -52,9 +58,7 @@ export class Walks {
     if (requested === this.requested) return;
     this.requested = requested;
     this.request =
-      mesh && start && walk && isReadable
-        ? { mesh, starts: [start], directions: [walk], lengths: [Math.hypot(...walk)], barriers }
-        : null;
+      mesh && start && walk && isReadable ? { mesh, start, direction: walk, barriers } : null;
     if (this.request) {
       this.latestOnly.ask(this.request);
     } else {
@@ -69,9 +73,11 @@ export class Walks {
   }
 
   private async answer(request: WalkRequest, signal: AbortSignal): Promise<void> {
-    const { mesh, ...question } = request;
-    const [line] = await askTrace(mesh, question, signal);
-    if (this.request?.mesh === mesh) this.show(line ?? null);
+    const { mesh, start, direction, barriers } = request;
+    const length = Math.hypot(...direction);
+    const call = { barriers, signal };
+    const { lines } = await service.trace(mesh, [start], [direction], [length], call);
+    if (this.request?.mesh === mesh) this.show(lines[0] ?? null);
   }
 
   private show(line: StraightLine | null): void {

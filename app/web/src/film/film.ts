@@ -1,5 +1,5 @@
 // A film of a sweep: what is there after each step, and what the step did, in the paper's words.
-import type { SweepAnswer } from "../api/types";
+import type { SweepAnswer } from "geodesic-client";
 import { count, written } from "../dom";
 
 /** What a step did. */

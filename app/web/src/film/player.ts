@@ -1,8 +1,8 @@
 // The film of the search: asked for, played, paused, scrubbed, and saved as a video.
-import { askSweep } from "../api/queries";
 import { byId } from "../dom";
 import { InputError } from "../inputError";
 import { foldOnPhone } from "../panel/appearance";
+import { service } from "../service";
 import { startsOf } from "../state/places";
 import { type State, type Store, unitOf } from "../state/state";
 import type { Status } from "../status";
@@ -91,7 +91,8 @@ export class Player {
     const { signal } = this.stop;
     this.asked = question(state);
     this.status.run("busy", "Following the sweep…", this.stop, async (onProgress) => {
-      const sweep = await askSweep(mesh, { sources, barriers, steps: STEPS }, onProgress, signal);
+      const call = { barriers, steps: STEPS, onProgress, signal };
+      const sweep = await service.sweepSteps(mesh, sources, call);
       signal.throwIfAborted();
       this.film = new Film(sweep);
       this.sceneView.stage.showsLines = false;

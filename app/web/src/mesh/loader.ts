@@ -1,10 +1,12 @@
 // A mesh of the store in the page. A worker fetches its arrays and derives what takes long.
+
+import type { MeshDocument } from "geodesic-client";
+import { ProblemError } from "geodesic-client";
 import { BufferAttribute, BufferGeometry } from "three";
 import { MeshBVH } from "three-mesh-bvh";
-import { authorization } from "../api/http";
-import { ProblemError } from "../api/problemError";
-import type { MeshDocument, Point } from "../api/types";
 import { InputError } from "../inputError";
+import { service } from "../service";
+import type { Point } from "../state/point";
 import { drawnIn, type Frame, type Up } from "./frame";
 import type { Plane } from "./plane";
 
@@ -13,9 +15,9 @@ type Triple = [number, number, number];
 export type LoaderRequest =
   | {
       kind: "mesh";
-      vertices: string;
-      faces: string;
-      headers: Record<string, string>;
+      id: string;
+      address: string;
+      apiKey: string | null;
       up: Up | null;
     }
   | { kind: "edges" };
@@ -31,7 +33,7 @@ export type LoaderResponse =
     }
   | { kind: "tree"; roots: ArrayBuffer[]; order: Uint32Array | Uint16Array }
   | { kind: "edges"; edges: Uint32Array<ArrayBuffer> }
-  | { kind: "problem"; problem: ProblemError["problem"] }
+  | { kind: "problem"; problem: ProblemError["document"] }
   | { kind: "failure"; message: string };
 
 type ResponseOf<K> = Extract<LoaderResponse, { kind: K }>;
@@ -78,6 +80,11 @@ export class LoadedMesh {
   corners(face: number): Triple {
     const { faces } = this.shape;
     return [faces[3 * face]!, faces[3 * face + 1]!, faces[3 * face + 2]!];
+  }
+
+  /** Positions of the vertices, in mesh units. */
+  get vertices(): Float64Array {
+    return this.shape.vertices;
   }
 
   /** Return the position of a vertex, in mesh units. */
@@ -130,8 +137,7 @@ export async function loadMesh(
   up: Up | null,
   signal: AbortSignal,
 ): Promise<LoadedMesh> {
-  const { vertices, faces } = document.arrays as Record<string, string>;
-  if (!vertices) {
+  if (!("vertices" in document.arrays)) {
     throw new InputError(
       "This mesh cannot be drawn",
       "It is given by the lengths of its edges, and has no positions in space.",
@@ -140,14 +146,8 @@ export async function loadMesh(
   }
   const worker = new LoaderWorker();
   signal.addEventListener("abort", () => worker.end());
-  const question = {
-    kind: "mesh" as const,
-    vertices,
-    faces: faces!,
-    headers: authorization(),
-    up,
-  };
-  const shape = await worker.ask(question, "shape");
+  const { address, apiKey } = service;
+  const shape = await worker.ask({ kind: "mesh", id: document.id, address, apiKey, up }, "shape");
   signal.throwIfAborted();
   return new LoadedMesh(document, shape, worker);
 }

@@ -1,8 +1,7 @@
 // Off the main thread: fetch the arrays, compute normals, build the tree for picking.
+import { GeodesicClient, ProblemError } from "geodesic-client";
 import { BufferAttribute, BufferGeometry } from "three";
 import { MeshBVH } from "three-mesh-bvh";
-import { parseNpy, toIndices } from "../api/npy";
-import { ProblemError, problemOfResponse } from "../api/problemError";
 import { drawnIn, frameOf } from "./frame";
 import type { LoaderRequest, LoaderResponse } from "./loader";
 
@@ -13,20 +12,19 @@ self.onmessage = async ({ data }: MessageEvent<LoaderRequest>) => {
     if (data.kind === "mesh") await load(data);
     else sendEdges();
   } catch (error) {
-    if (error instanceof ProblemError) send({ kind: "problem", problem: error.problem });
+    if (error instanceof ProblemError) send({ kind: "problem", problem: error.document });
     else send({ kind: "failure", message: error instanceof Error ? error.message : String(error) });
   }
 };
 
-async function load({
-  vertices,
-  faces: facesUrl,
-  headers,
-  up,
-}: LoaderRequest & { kind: "mesh" }): Promise<void> {
-  const [points, corners] = await Promise.all([array(vertices, headers), array(facesUrl, headers)]);
-  const doubles = Float64Array.from(points.data as Float64Array);
-  faces = toIndices(corners);
+async function load(question: LoaderRequest & { kind: "mesh" }): Promise<void> {
+  const { id, address, apiKey, up } = question;
+  const service = new GeodesicClient(address, { apiKey });
+  const [{ data: doubles }, corners] = await Promise.all([
+    service.array(id, "vertices"),
+    service.array(id, "faces"),
+  ]);
+  faces = new Uint32Array(corners.data.buffer);
   const frame = frameOf(doubles, up);
   const positions = new Float32Array(doubles.length);
   for (let i = 0; i < doubles.length; i += 3) {
@@ -46,15 +44,6 @@ function sendTree(positions: Float32Array): void {
     cloneBuffers: false,
   });
   send({ kind: "tree", roots: tree.roots as ArrayBuffer[], order: tree.indirectBuffer! });
-}
-
-async function array(
-  url: string,
-  headers: Record<string, string>,
-): Promise<ReturnType<typeof parseNpy>> {
-  const response = await fetch(url, { headers });
-  if (!response.ok) throw await problemOfResponse(response);
-  return parseNpy(await response.arrayBuffer());
 }
 
 /** Return area-weighted normals at vertices, pointing outwards on the whole whatever the winding. */

@@ -1,7 +1,7 @@
 // Picking: from a place on the screen to a point of the surface, and the positions of points.
 import { type Camera, DoubleSide, Ray, Vector3 } from "three";
 import type { MeshBVH } from "three-mesh-bvh";
-import type { Point } from "../api/types";
+import type { Point } from "../state/point";
 import type { LoadedMesh } from "./loader";
 
 /** What is no farther in front of a position, in radii of the mesh, does not hide it. */

@@ -1,10 +1,9 @@
 // The surface unrolled: each vertex where the log map of a point has it, and cut where this tears.
+import type { LogMap } from "geodesic-client";
 import { BufferAttribute, BufferGeometry } from "three";
 import type { Triple } from "./frame";
 import type { LoadedMesh } from "./loader";
 
-/** Numbers of the log map for each vertex: distance, angle, x, y, bends. */
-const ROW = 5;
 /** Paths to both ends of an edge go round different sides if it is this many times as long. */
 const TORN = 2;
 
@@ -17,26 +16,25 @@ export class Plane {
 
   constructor(
     private readonly mesh: LoadedMesh,
-    logMap: Float64Array,
+    { distances, coordinates }: Pick<LogMap, "distances" | "coordinates">,
   ) {
     const { vertices, faces } = mesh.document;
     let radius = 0;
-    for (let v = 0; v < vertices; v++) {
-      const distance = logMap[ROW * v] ?? Infinity;
+    for (const distance of distances) {
       if (distance < Infinity) radius = Math.max(radius, distance);
     }
     this.radius = radius || 1;
     this.positions = new Float32Array(3 * vertices);
     for (let v = 0; v < vertices; v++) {
       for (const axis of [0, 1])
-        this.positions[3 * v + axis] = (logMap[ROW * v + 2 + axis] ?? 0) / this.radius;
+        this.positions[3 * v + axis] = (coordinates[2 * v + axis] ?? 0) / this.radius;
     }
     this.kept = new Uint8Array(faces);
     const index = new Uint32Array(3 * faces);
     for (let face = 0; face < faces; face++) {
       const corners = mesh.corners(face);
       const isKept =
-        corners.every((v) => (logMap[ROW * v] ?? Infinity) < Infinity) && !this.isTorn(corners);
+        corners.every((v) => (distances[v] ?? Infinity) < Infinity) && !this.isTorn(corners);
       this.kept[face] = isKept ? 1 : 0;
       // Other faces have no extent, so that all keep their numbers.
       index.set(isKept ? corners : [corners[0], corners[0], corners[0]], 3 * face);

@@ -1,5 +1,5 @@
 // Numbers of a file: one for each vertex or each face of a mesh.
-import { parseNpy } from "../api/npy";
+import { parseNpy } from "geodesic-client";
 import { InputError } from "../inputError";
 import type { Values } from "../state/state";
 

@@ -1,14 +1,14 @@
 // Fields and switches: they show the state and change it.
-import { getMesh } from "../api/meshes";
-import { locate } from "../api/queries";
-import type { Effort, Method, Point } from "../api/types";
+import type { Effort, Method } from "geodesic-client";
 import { hasCost } from "../ask/costs";
 import { versusOf } from "../ask/fields";
 import { byId, query, written } from "../dom";
 import type { Up } from "../mesh/frame";
+import { service } from "../service";
 import { LONGEST_UNIT, readState, type WrittenState, writeRanges } from "../state/permalink";
 import { nameOf, type Place, type Tool } from "../state/places";
-import { parsePlaces, type WrittenPoint, writePlaces } from "../state/point";
+import type { Point } from "../state/point";
+import { parsePlaces, pointOf, type WrittenPoint, writePlaces } from "../state/point";
 import {
   INITIAL,
   type Lines,
@@ -254,21 +254,24 @@ export async function located<Q extends Pick<WrittenState, "places">>(
   question: Q,
 ): Promise<{ change: Omit<Q, "places"> & Pick<State, "places">; notes: string[] }> {
   const notes: string[] = [];
-  const pointOf = async (given: WrittenPoint): Promise<Point> => {
+  const locate = async (given: WrittenPoint): Promise<Point> => {
     if (!("position" in given)) return given;
-    const [{ point, distance }, { mean_edge_length }] = await Promise.all([
-      locate(mesh, given.position),
-      getMesh(mesh),
+    const [{ points }, { mean_edge_length }] = await Promise.all([
+      service.locate(mesh, [given.position]),
+      service.mesh(mesh),
     ]);
+    const [found] = points;
+    if (!found) throw new Error("The service found no point of the surface there.");
+    const { distance } = found;
     if (distance > FAR * mean_edge_length) {
       const away = `${written(distance, 4)} away from the surface`;
       notes.push(`The position ${given.position.join(", ")} is ${away}: its nearest point counts.`);
     }
-    return point;
+    return pointOf(found);
   };
   const places = await Promise.all(
     question.places.map(async ({ point, name }): Promise<Place> => {
-      return { point: await pointOf(point), name };
+      return { point: await locate(point), name };
     }),
   );
   return { change: { ...question, places }, notes };

@@ -1,9 +1,16 @@
 // Cutting the mesh along what is drawn on it: the cut mesh opens in place of the mesh.
-import { askCurves, askCut, type SurfaceCurve, type Waiting } from "../api/tools";
-import type { Outline, StraightLine } from "../api/types";
+import type {
+  Call,
+  Isoline,
+  IsolinesAnswer,
+  PathAnswer,
+  StraightLine,
+  SurfaceCurve,
+} from "geodesic-client";
 import { bordersOf } from "../ask/borders";
 import { isolinesOf, levelSetsOf } from "../ask/isolines";
 import { byId, count } from "../dom";
+import { service } from "../service";
 import { type State, type Store, withMesh } from "../state/state";
 import type { Status } from "../status";
 import type { Notes } from "./notes";
@@ -13,7 +20,7 @@ type Kind = (typeof KINDS)[number];
 
 /** What is drawn now. */
 export interface Drawn {
-  path: Outline | null;
+  path: PathAnswer | null;
   walk: StraightLine | null;
   /** The largest distance or cost, up to which isolines are drawn. */
   largest: number;
@@ -63,12 +70,13 @@ export class Cutting {
     }
     const stop = new AbortController();
     this.status.run("busy", "Cutting…", stop, async (onProgress) => {
-      const waiting = { onProgress, signal: stop.signal };
+      const call = { onProgress, signal: stop.signal };
       const curves = await Promise.all(
-        kinds.map((kind) => curvesOf(kind, mesh, state, this.drawn(), waiting)),
+        kinds.map((kind) => curvesOf(kind, mesh, state, this.drawn(), call)),
       );
-      const question = { curves: curves.flat(), name: `cut along ${kinds.join(", ")}` };
-      const { cut_mesh_id, parts, vertices, warnings } = await askCut(mesh, question, waiting);
+      const name = `cut along ${kinds.join(", ")}`;
+      const answer = await service.cut(mesh, curves.flat(), { name, ...call });
+      const { cut_mesh_id, parts, vertices, warnings } = answer;
       stop.signal.throwIfAborted();
       const { unit, up } = state;
       const seen = { unit, up: this.drawn().up ?? up, view: this.drawn().view, boundary: true };
@@ -90,15 +98,31 @@ async function curvesOf(
   mesh: string,
   state: State,
   { path, walk, largest }: Drawn,
-  waiting: Waiting,
+  call: Call,
 ): Promise<SurfaceCurve[]> {
   if (kind === "path" || kind === "walk") {
     const locations = (kind === "path" ? path : walk)?.locations;
     return locations ? [{ polyline: locations }] : [];
   }
-  if (kind === "borders") return askCurves(mesh, kind, bordersOf(state), waiting);
+  const more = { include: ["locations" as const], ...call };
+  if (kind === "borders") {
+    const { sources, ...question } = bordersOf(state);
+    return curvesAlong((await service.borders(mesh, sources, { ...question, ...more })).borders);
+  }
   const { lines, values } = state;
   if (lines === null) return [];
-  const question = values ? levelSetsOf(values, lines) : isolinesOf(state, lines, largest);
-  return askCurves(mesh, kind, question, waiting);
+  if (values) {
+    const { values: numbers, ...question } = levelSetsOf(values, lines);
+    return curvesAt((await service.isolines(mesh, numbers, { ...question, ...more })).isolines);
+  }
+  const { sources, ...question } = isolinesOf(state, lines, largest);
+  return curvesAt((await service.isolines(mesh, sources, { ...question, ...more })).isolines);
+}
+
+function curvesAt(levels: IsolinesAnswer["isolines"]): SurfaceCurve[] {
+  return curvesAlong(levels.flatMap(({ lines }) => lines));
+}
+
+function curvesAlong(lines: Pick<Isoline, "locations" | "closed">[]): SurfaceCurve[] {
+  return lines.map(({ locations, closed }) => ({ polyline: locations ?? [], closed }));
 }

@@ -1,17 +1,18 @@
 // Exports: links, commands, files and a picture.
-import { authorization, post } from "../api/http";
-import type { About, Point } from "../api/types";
+import type { About } from "geodesic-client";
 import { bordersOf } from "../ask/borders";
-import { costOf } from "../ask/costs";
 import { questionOf } from "../ask/fields";
 import { isolinesOf } from "../ask/isolines";
 import { button, byId, download } from "../dom";
+import { service } from "../service";
 import { writeState } from "../state/permalink";
-import { endOf, startsOf, stopsOf } from "../state/places";
+import { endOf, startsOf } from "../state/places";
+import type { Point } from "../state/point";
 import type { State, Store } from "../state/state";
 import type { Status } from "../status";
+import { type Drawn, glbOf } from "../view/glb";
 import type { Stage } from "../view/scene";
-import { curlOf, pythonOf } from "./snippets";
+import { curlOf, pathOf, pythonOf } from "./snippets";
 
 type Product = "distances" | "path" | "isolines" | "borders";
 
@@ -30,18 +31,35 @@ export class ExportPanel {
     private readonly status: Status,
     private readonly stage: Stage,
   ) {
-    const hasKey = (): boolean => "Authorization" in authorization();
-    const service = new URL(".", location.href).href;
+    const hasKey = (): boolean => service.apiKey !== null;
     onCopy(
       "copy-link",
       "The link",
-      () => new URL(writeState({ ...store.state, view: stage.view }), service).href,
+      () => new URL(writeState({ ...store.state, view: stage.view }), service.address).href,
     );
-    onCopy("copy-curl", "The command", () => curlOf(store.state, this.source(), service, hasKey()));
+    onCopy("copy-curl", "The command", () =>
+      curlOf(store.state, this.source(), service.address, hasKey()),
+    );
     onCopy("copy-python", "The program", () =>
-      pythonOf(store.state, this.source(), service, hasKey()),
+      pythonOf(store.state, this.source(), service.address, hasKey()),
     );
     byId("picture").addEventListener("click", () => this.savePicture());
+    byId("glb").addEventListener("click", () => {
+      status.run("busy", "Writing what is drawn…", new AbortController(), async () => {
+        const drawn = this.drawn();
+        if (drawn) download(await glbOf(drawn), "geodesic.glb");
+      });
+    });
+    byId("geojson").addEventListener("click", () => {
+      const lines = this.drawn()?.lines ?? [];
+      const features = lines.map(({ name, points }) => ({
+        type: "Feature",
+        properties: { name },
+        geometry: { type: "LineString", coordinates: points },
+      }));
+      const text = JSON.stringify({ type: "FeatureCollection", features });
+      download(new Blob([text], { type: "application/geo+json" }), "geodesic.geojson");
+    });
   }
 
   /** Offer the formats that the service writes, and name the others. */
@@ -81,31 +99,39 @@ export class ExportPanel {
         choice.disabled = !isThere;
     }
     for (const id of ["copy-curl", "copy-python"]) byId(id, HTMLButtonElement).disabled = !hasField;
-    byId("picture", HTMLButtonElement).disabled = state.mesh === null;
+    for (const id of ["picture", "glb", "geojson"]) {
+      byId(id, HTMLButtonElement).disabled = state.mesh === null;
+    }
   }
 
   private save(what: Product, format: string): void {
     const stop = new AbortController();
     this.status.run("busy", `Fetching ${what}…`, stop, async () => {
       const { mesh } = this.store.state;
-      const body = this.bodyOf(what);
-      const path = `v1/meshes/${mesh}/${what}?format=${format}`;
-      const response = await post(path, body, {}, stop.signal);
-      download(await response.blob(), `${what}.${format}`);
+      if (mesh === null) return;
+      download(await this.fileOf(mesh, what, format, stop.signal), `${what}.${format}`);
     });
   }
 
-  private bodyOf(what: Product): unknown {
+  private fileOf(mesh: string, what: Product, format: string, signal: AbortSignal): Promise<Blob> {
     const { state } = this.store;
-    const { barriers, lines } = state;
-    const [target, waypoints] = [endOf(state), stopsOf(state)];
-    const cost = costOf(state);
-    const path = { source: this.source(), target, waypoints, barriers };
-    if (what === "path") return cost ? { ...path, cost } : path;
-    if (what === "borders") return bordersOf(state);
-    if (what === "distances" || lines === null) return questionOf(state, state.method);
-    return isolinesOf(state, lines, this.largest());
+    const [target, lines] = [endOf(state), state.lines];
+    if (what === "path" && target) {
+      return service.file(mesh, what, { ...pathOf(state, this.source(), target), signal }, format);
+    }
+    if (what === "borders") {
+      return service.file(mesh, what, { ...bordersOf(state), signal }, format);
+    }
+    if (what === "isolines" && lines) {
+      const question = isolinesOf(state, lines, this.largest());
+      return service.file(mesh, what, { ...question, signal }, format);
+    }
+    const question = questionOf(state, state.method);
+    return service.file(mesh, "distances", { ...question, signal }, format);
   }
+
+  /** Return what is drawn, in mesh units. */
+  drawn: () => Drawn | null = () => null;
 
   /** Return the largest distance that is drawn. */
   largest: () => number = () => 0;

@@ -1,5 +1,5 @@
 // The keyboard: keys for everything that a pointer does.
-import type { Method } from "../api/types";
+import type { Method } from "geodesic-client";
 import { byId } from "../dom";
 import { INITIAL, type Store } from "../state/state";
 import type { Status } from "../status";

@@ -1,9 +1,9 @@
 // Choosing a mesh: from a file, from a sample or from the store.
-import { listMeshes, makeSample, uploadMesh } from "../api/meshes";
-import type { About, ListedMesh, MeshDocument } from "../api/types";
+import type { About, ListedMesh, MeshDocument } from "geodesic-client";
 import { byId, count } from "../dom";
 import { InputError } from "../inputError";
 import { NUMBERS } from "../mesh/values";
+import { service } from "../service";
 import { type Store, withMesh } from "../state/state";
 import type { OnProgress, Status } from "../status";
 
@@ -91,7 +91,10 @@ export class Meshes {
   }
 
   private async listed(cursor: string | null): Promise<HTMLOptionElement[]> {
-    const { meshes, next_cursor } = await listMeshes(cursor);
+    const { meshes, next_cursor } = await service.meshes({
+      limit: 100,
+      ...(cursor !== null && { cursor }),
+    });
     const options = meshes.map((mesh) => new Option(nameOf(mesh), mesh.id));
     if (next_cursor) {
       const more = new Option("More…", MORE);
@@ -114,7 +117,11 @@ export class Meshes {
       return;
     }
     this.create(`Uploading ${file.name}…`, async (onProgress, signal) => {
-      const mesh = await uploadMesh(file, merge, onProgress, signal);
+      const mesh = await service.upload(file, {
+        merge,
+        onProgress: (share) => onProgress(share < 1 ? share : null),
+        signal,
+      });
       this.files.set(mesh.id, file);
       return mesh;
     });
@@ -122,7 +129,7 @@ export class Meshes {
 
   private make(name: string): void {
     this.showChosen();
-    this.create(`Making ${titleOf(name)}…`, () => makeSample(name, SAMPLES[name] ?? 0));
+    this.create(`Making ${titleOf(name)}…`, () => service.sample(name, SAMPLES[name]));
   }
 
   private create(

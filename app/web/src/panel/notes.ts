@@ -1,5 +1,5 @@
 // What a user must know of the answers that are shown: sentences below the legend.
-import type { MeshDocument } from "../api/types";
+import type { MeshDocument } from "geodesic-client";
 import { byId } from "../dom";
 
 type Topic =

@@ -1,8 +1,8 @@
 // Mouse, fingers and keys on the mesh: a click sets a point, a drag moves it.
 import { Vector3 } from "three";
-import type { Point } from "../api/types";
 import { drawnAt, type FacePoint, positionOf } from "../mesh/picking";
 import { type Act, actOf, nameOf, type Place, placedAt, type Tool } from "../state/places";
+import type { Point } from "../state/point";
 import { rounded } from "../state/point";
 import { NO_QUESTION, type State, type Store } from "../state/state";
 import type { SceneView } from "../view/sceneView";

@@ -1,5 +1,5 @@
 // The height of a path over its length, as a small chart.
-import type { Outline } from "../api/types";
+import type { PathAnswer } from "geodesic-client";
 import { byId, written } from "../dom";
 import { differences, type Triple, type Up } from "../mesh/frame";
 
@@ -46,7 +46,7 @@ export class ProfileChart {
   }
 
   /** Show the profile of a path, or none. */
-  show(outline: Outline | null, up: Up, unit: string): void {
+  show(outline: PathAnswer | null, up: Up, unit: string): void {
     this.points = (outline?.points ?? []) as Triple[];
     this.unit = unit;
     this.mark(null);

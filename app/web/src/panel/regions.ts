@@ -1,10 +1,9 @@
 // Points spread over the surface, as starts of their own territories.
-
-import { pointOf } from "../api/queries";
-import { askSamples } from "../api/tools";
 import { byId, count, written } from "../dom";
 import { InputError } from "../inputError";
+import { service } from "../service";
 import { startsOf } from "../state/places";
+import { pointOf } from "../state/point";
 import { type Store, unitOf } from "../state/state";
 import type { Status } from "../status";
 import type { Notes } from "./notes";
@@ -41,9 +40,11 @@ export class Regions {
       const starts = state.distances ? startsOf(state) : [];
       const wanted = kind === "count" ? { count: Math.round(value) } : { radius: value };
       if (!(value > 0) || (wanted.count ?? 0) > MOST) throw wrongNumber(kind);
-      const question = { starts, barriers, ...wanted } as Parameters<typeof askSamples>[1];
-      const waiting = { onProgress, signal: stop.signal };
-      const { points, covering_radius, warnings } = await askSamples(mesh, question, waiting);
+      const { points, covering_radius, warnings } = await service.samples(mesh, {
+        ...{ starts, barriers, ...wanted },
+        onProgress,
+        signal: stop.signal,
+      });
       if (points.length > MOST) throw tooMany(points.length);
       stop.signal.throwIfAborted();
       const names = state.places.slice(0, starts.length).map(({ name }) => name);

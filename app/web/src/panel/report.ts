@@ -1,5 +1,5 @@
 // The report on a mesh in words, and its faults marked on the mesh.
-import type { MeshDocument } from "../api/types";
+import type { MeshDocument } from "geodesic-client";
 import { button, byId, count, written } from "../dom";
 import { positionOf } from "../mesh/picking";
 import type { SceneView } from "../view/sceneView";

@@ -1,50 +1,51 @@
 // The current query as a curl command and as a Python program.
-import type { Point } from "../api/types";
+
+import { type Question, toWire } from "geodesic-client";
 import { costOf } from "../ask/costs";
 import { questionOf } from "../ask/fields";
 import { endOf, stopsOf } from "../state/places";
+import type { Point } from "../state/point";
 import type { State } from "../state/state";
 
-interface Query {
-  path: string;
-  body: unknown;
-}
+type Body = Record<string, unknown>;
 
-/** Return the query for the path where there is a target, otherwise for the distances. */
-function queryOf(state: State, source: Point): Query {
-  const { barriers } = state;
-  const [target, waypoints] = [endOf(state), stopsOf(state)];
-  const mesh = `v1/meshes/${state.mesh}`;
-  if (!target) return { path: `${mesh}/distances`, body: questionOf(state, state.method) };
+/** Return the question for the path from a source to a target. */
+export function pathOf(state: State, source: Point, target: Point): Question<"path"> {
   const cost = costOf(state);
+  const question = { source, target, waypoints: stopsOf(state), barriers: state.barriers };
+  return cost ? { ...question, cost } : question;
+}
+
+/** Return the query that a state asks, by its end and its members in the service's names. */
+function queryOf(state: State, source: Point): { kind: "path" | "distances"; body: Body } {
+  const target = endOf(state);
+  if (!target) return { kind: "distances", body: toWire(questionOf(state, state.method)) };
+  const { waypoints, barriers, ...question } = pathOf(state, source, target);
   const more = {
-    ...(cost && { cost }),
-    ...(waypoints.length > 0 && { waypoints }),
-    ...(barriers.length > 0 && { barriers }),
+    ...(waypoints?.length && { waypoints }),
+    ...(barriers?.length && { barriers }),
   };
-  return { path: `${mesh}/path`, body: { source, target, ...more } };
+  return { kind: "path", body: toWire({ ...question, ...more }) };
 }
 
-export function curlOf(state: State, source: Point, service: string, hasKey: boolean): string {
-  const { path, body } = queryOf(state, source);
+export function curlOf(state: State, source: Point, address: string, hasKey: boolean): string {
+  const { kind, body } = queryOf(state, source);
   const key = hasKey ? ` -H "Authorization: Bearer $GEODESIC_KEY"` : "";
-  return `curl '${service}${path}'${key} -H 'Content-Type: application/json' \\\n  -d '${JSON.stringify(body)}'`;
+  return `curl '${address}v1/meshes/${state.mesh}/${kind}'${key} -H 'Content-Type: application/json' \\\n  -d '${JSON.stringify(body)}'`;
 }
 
-export function pythonOf(state: State, source: Point, service: string, hasKey: boolean): string {
-  const { path, body } = queryOf(state, source);
-  const key = hasKey ? `, "Authorization": "Bearer " + os.environ["GEODESIC_KEY"]` : "";
-  const results = endOf(state) ? `answer["length"], answer["points"]` : `answer["distances"]`;
+/** Return a program for the Python client; its members are those of the request, and JSON is Python. */
+export function pythonOf(state: State, source: Point, address: string, hasKey: boolean): string {
+  const { kind, body } = queryOf(state, source);
+  const key = hasKey ? `, api_key=os.environ["GEODESIC_KEY"]` : "";
+  const members = Object.entries(body).map(([name, value]) => `${name}=${JSON.stringify(value)}`);
   return [
-    "import json",
     ...(hasKey ? ["import os"] : []),
-    "from urllib.request import Request, urlopen",
+    "from geodesic_client import Client",
     "",
-    `body = json.loads('${JSON.stringify(body)}')`,
-    `headers = {"Content-Type": "application/json"${key}}`,
-    `request = Request("${service}${path}", json.dumps(body).encode(), headers)`,
-    "answer = json.load(urlopen(request))",
-    `print(${results})`,
+    `client = Client(${JSON.stringify(address)}${key})`,
+    `found = client.${kind}("${state.mesh}", ${members.join(", ")})`,
+    `print(${kind === "path" ? "found.length, found.points" : "found.distances"})`,
     "",
   ].join("\n");
 }

@@ -1,5 +1,5 @@
 // The state as the page's address, and back: /?mesh=ID&source=v0*Home&target=v99
-import type { Effort, Method } from "../api/types";
+import type { Effort, Method } from "geodesic-client";
 import { InputError } from "../inputError";
 import type { Triple, Up } from "../mesh/frame";
 import type { Place } from "./places";

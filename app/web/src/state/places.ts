@@ -1,6 +1,7 @@
 // The points of the question in one list: where a path may start, its stops, and its end.
-import type { Point } from "../api/types";
+
 import { differences, type Triple } from "../mesh/frame";
+import type { Point } from "./point";
 import type { State } from "./state";
 
 /** A point, and the name that the user gave it; without one, its place in the list names it. */

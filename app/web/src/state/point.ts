@@ -1,7 +1,14 @@
 // Points as text: v12, e12-13:0.3, f7:0.2,0.3, p1,2,3; and lists of them: v12 > v5 > v99.
-import type { Point } from "../api/types";
+
+import type { ResolvedPoint } from "geodesic-client";
 import { InputError } from "../inputError";
 import { type Places, startsOf } from "./places";
+
+/** A point of the surface. Positions in space are not stored: the service locates them first. */
+export type Point =
+  | { vertex: number }
+  | { edge: [number, number]; t: number }
+  | { face: number; barycentric: [number, number, number] };
 
 export type WrittenPoint = Point | { position: [number, number, number] };
 
@@ -46,6 +53,13 @@ export function parsePlaces(text: string, before: Places): Places<WrittenPoint> 
     })),
     starts: Math.max(1, first.length),
   };
+}
+
+/** Return a point of an answer: at a vertex by its number, otherwise within a face. */
+export function pointOf({ vertex, face, barycentric }: Partial<ResolvedPoint>): Point {
+  if (vertex != null) return { vertex };
+  if (face != null && barycentric) return { face, barycentric };
+  throw new Error("The service returned a point that is neither at a vertex nor in a face.");
 }
 
 export function writePlaces(list: Places): string {

@@ -1,5 +1,5 @@
 // The state of the page: all that the user has chosen. Everything that is drawn follows from it.
-import type { Effort, Method } from "../api/types";
+import type { Effort, Method } from "geodesic-client";
 import type { Triple, Up } from "../mesh/frame";
 import type { Place } from "./places";
 

@@ -1,6 +1,7 @@
 // Isolines and borders as thin lines with a dark casing, so that they show on each colour.
+
+import type { Isoline } from "geodesic-client";
 import { BufferGeometry } from "three";
-import type { Line } from "../api/types";
 import type { LoadedMesh } from "../mesh/loader";
 import { ribbonMesh, ribbons } from "./ribbon";
 import { LINES, type Stage } from "./scene";
@@ -30,7 +31,7 @@ export class IsolineLayer {
   /** Show lines on a mesh, in place of the ones before. A closed line does not repeat its start. */
   show(
     mesh: Pick<LoadedMesh, "drawnLines"> | null,
-    lines: Pick<Line, "points" | "closed" | "faces">[],
+    lines: Pick<Isoline, "points" | "closed" | "faces">[],
   ): void {
     const isShown = mesh !== null && lines.length > 0;
     if (!isShown && !this.object.visible) return;

@@ -1,14 +1,17 @@
 // The mesh on the stage, with points, path, barriers and faults on it.
-import { Mesh, PlaneGeometry, Vector3 } from "three";
-import { MeshBVH } from "three-mesh-bvh";
+
 import type {
   Border,
+  Boundary,
+  Isoline,
   IsolinesAnswer,
-  Line,
+  LogMap,
   MeshDocument,
-  Outline,
+  PathAnswer,
   StraightLine,
-} from "../api/types";
+} from "geodesic-client";
+import { Mesh, PlaneGeometry, Vector3 } from "three";
+import { MeshBVH } from "three-mesh-bvh";
 import { written } from "../dom";
 import { frontOf, type Up } from "../mesh/frame";
 import { type LoadedMesh, loadMesh } from "../mesh/loader";
@@ -105,7 +108,7 @@ export class SceneView {
   }
 
   /** Unroll the surface into the plane of a log map. */
-  unroll(logMap: Float64Array): void {
+  unroll(logMap: LogMap): void {
     const { mesh, surface } = this;
     if (!mesh || !surface) return;
     mesh.plane = new Plane(mesh, logMap);
@@ -223,7 +226,7 @@ export class SceneView {
     this.barriers.show(this.mesh, isReadable ? barriers : []);
   }
 
-  showRoute(outline: Outline | null): void {
+  showRoute(outline: PathAnswer | null): void {
     const { points, faces } = outline ?? {};
     this.route.show((this.mesh && points && this.mesh.drawnLines(points, faces ?? [])) || []);
   }
@@ -237,14 +240,14 @@ export class SceneView {
     this.walkEnd.show(end.map((position) => ({ position, fill: WALK, size: 13 })));
   }
 
-  showRays(rays: Pick<Line, "points" | "faces">[]): void {
+  showRays(rays: Pick<Isoline, "points" | "faces">[]): void {
     this.rays.show(
       this.mesh,
       rays.map((ray) => ({ ...ray, closed: false })),
     );
   }
 
-  showBoundary(lines: Line[]): void {
+  showBoundary(lines: Boundary[]): void {
     this.boundary.show(this.mesh, lines);
   }
 

@@ -1,6 +1,7 @@
 // Territories: borders as lines, and the faces that they cross, coloured on either side.
+
+import type { Border } from "geodesic-client";
 import { BufferAttribute, BufferGeometry, Mesh, type ShaderMaterial } from "three";
-import type { Border } from "../api/types";
 import { divide, type Piece } from "../mesh/division";
 import type { LoadedMesh } from "../mesh/loader";
 import { placeIn } from "../mesh/plane";

@@ -1,4 +1,6 @@
 // Windows of a sweep as ribbons along their edges, each inside the face that it is about to cross.
+
+import type { SweepAnswer } from "geodesic-client";
 import {
   BufferAttribute,
   DoubleSide,
@@ -7,7 +9,6 @@ import {
   Mesh,
   ShaderMaterial,
 } from "three";
-import type { SweepAnswer } from "../api/types";
 import type { LoadedMesh } from "../mesh/loader";
 import type { Rgb } from "./colours";
 import type { Stage } from "./scene";

@@ -1,6 +1,7 @@
 // Random points of a surface, as the page writes them.
-import type { Point } from "../../src/api/types";
+
 import type { Place } from "../../src/state/places";
+import type { Point } from "../../src/state/point";
 import { rounded } from "../../src/state/point";
 import type { Random } from "./random";
 

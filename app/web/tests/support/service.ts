@@ -15,7 +15,8 @@ type Answer = (sent: Sent) => Response | Promise<Response>;
 export function fakeService(routes: Record<string, Answer>): Sent[] {
   const requests: Sent[] = [];
   vi.stubGlobal("fetch", async (address: string, init: RequestInit = {}): Promise<Response> => {
-    const path = address.startsWith("/") ? address : `/${address}`; // as from the page at /
+    const { pathname, search } = new URL(address);
+    const path = pathname + search;
     const sent = {
       method: init.method ?? "GET",
       path,

@@ -1,10 +1,5 @@
 // Arrays in NumPy's .npy format: a header of text, then the raw numbers.
 
-export interface NpyArray {
-  data: Float64Array | Float32Array | Int32Array | Uint32Array | BigInt64Array;
-  shape: number[];
-}
-
 const KINDS = {
   "<f8": Float64Array,
   "<f4": Float32Array,
@@ -12,6 +7,11 @@ const KINDS = {
   "<u4": Uint32Array,
   "<i8": BigInt64Array,
 } as const;
+
+export interface NpyArray {
+  data: InstanceType<(typeof KINDS)[keyof typeof KINDS]>;
+  shape: number[];
+}
 
 /** Parse an array in C order; its numbers share memory with ``buffer``. */
 export function parseNpy(buffer: ArrayBuffer): NpyArray {
@@ -35,7 +35,21 @@ export function parseNpy(buffer: ArrayBuffer): NpyArray {
   };
 }
 
-/** Return the numbers as 32-bit indices: the service writes 64 bits, but no mesh needs as many. */
-export function toIndices(array: NpyArray): Uint32Array<ArrayBuffer> {
-  return Uint32Array.from(array.data as ArrayLike<number | bigint>, Number);
+/** Return integers of 32 bits: the service writes 64, but no mesh needs as many. */
+export function toIntegers({ data }: NpyArray): Int32Array<ArrayBuffer> {
+  return Int32Array.from(data as ArrayLike<number | bigint>, Number);
+}
+
+/** Return the numbers as doubles; those that are not are copied. */
+export function toDoubles({ data }: NpyArray): Float64Array<ArrayBuffer> {
+  if (data instanceof Float64Array) return data;
+  return Float64Array.from(data as ArrayLike<number | bigint>, Number);
+}
+
+/** Write doubles of one dimension. */
+export function npyOf(values: Float64Array): Blob {
+  const text = `{'descr': '<f8', 'fortran_order': False, 'shape': (${values.length},), }`;
+  const header = `${text.padEnd(117)}\n`; // with the ten bytes before it, a multiple of 64
+  const start = Uint8Array.of(0x93, 0x4e, 0x55, 0x4d, 0x50, 0x59, 1, 0, header.length, 0);
+  return new Blob([start, header, values as Float64Array<ArrayBuffer>]);
 }

@@ -1,9 +1,14 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
-import { events } from "../src/api/events";
-import { answerOf } from "../src/api/jobs";
-import { ProblemError } from "../src/api/problemError";
-import { Random } from "./support/random";
-import { fakeService, inParts, json, type Sent } from "./support/service";
+import { Connection } from "../../../../client/typescript/src/connection";
+import { events } from "../../../../client/typescript/src/events";
+import { answerOf } from "../../../../client/typescript/src/jobs";
+import { ProblemError } from "../../../../client/typescript/src/problemError";
+import { Random } from "../support/random";
+import { fakeService, inParts, json, type Sent } from "../support/service";
+
+const CONNECTION = new Connection(new URL("http://localhost/"), null, (...request) =>
+  fetch(...request),
+);
 
 const LINKS = { self: "/v1/jobs/j", results: "/v1/jobs/j/results", events: "/v1/jobs/j/events" };
 
@@ -14,7 +19,7 @@ function eventOf(id: number, status: string, progress = 0): string {
 async function allOf(response: Response): Promise<{ id: string; data: string }[]> {
   fakeService({ "GET /events": () => response });
   const all = [];
-  for await (const event of events("/events", "", new AbortController().signal)) all.push(event);
+  for await (const event of events(CONNECTION, "events", "")) all.push(event);
   return all;
 }
 
@@ -63,7 +68,7 @@ describe("a job", () => {
   ): Sent[] {
     let connections = 0;
     return fakeService({
-      "POST /v1/x": () => json({ id: "j", status: "accepted", links: LINKS }, 202),
+      "POST /v1/x": () => json({ id: "j", status: "accepted" }, 202),
       "GET /v1/jobs/j/events": () => (streams[connections++] as () => Response)(),
       "GET /v1/jobs/j/results": results,
       "DELETE /v1/jobs/j": removed,
@@ -78,7 +83,8 @@ describe("a job", () => {
 
   function ask(stop = new AbortController()) {
     const onProgress = vi.fn();
-    const answer = answerOf("/v1/x", { a: 1 }, "text/csv", onProgress, stop.signal);
+    const init = { body: '{"a":1}', headers: { Accept: "text/csv" } };
+    const answer = answerOf(CONNECTION, "v1/x", init, { onProgress, signal: stop.signal });
     answer.catch(() => undefined); // looked at later
     return { answer, onProgress };
   }

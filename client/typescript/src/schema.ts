@@ -2048,6 +2048,11 @@ export interface components {
              * @description Curves to pull tight: each becomes the shortest near it, with its ends where they are. The `locations` of lines in answers are such points. With neither of the two, two loops are looked for at each handle
              */
             curves?: components["schemas"]["SurfaceCurve"][] | null;
+            /**
+             * Free Ends
+             * @description Whether ends of `curves` on the boundary slide along it, to where each is shortest. Default: `false`
+             */
+            free_ends?: boolean;
         };
         /**
          * MatrixAnswer
@@ -2873,6 +2878,11 @@ export interface components {
             title: string;
             /** Meaning */
             meaning: string;
+            /**
+             * Chapter
+             * @description Chapter of the documents that tells more: `geodesic docs CHAPTER` opens it
+             */
+            chapter: string;
         };
         /**
          * ProblemDocument

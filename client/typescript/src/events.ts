@@ -1,5 +1,5 @@
 // Server-sent events, read by fetch because EventSource cannot send a key.
-import { call } from "./http";
+import type { Connection } from "./connection.js";
 
 interface Event {
   id: string;
@@ -8,19 +8,22 @@ interface Event {
 
 /** Yield the events of a stream until it ends; ``lastId`` resumes after that event. */
 export async function* events(
+  connection: Connection,
   path: string,
   lastId: string,
-  signal: AbortSignal,
+  signal?: AbortSignal,
 ): AsyncGenerator<Event> {
   const headers = { Accept: "text/event-stream", ...(lastId ? { "Last-Event-ID": lastId } : {}) };
-  const { body } = await call(path, { headers, signal });
+  const { body } = await connection.call(path, { headers, ...(signal && { signal }) });
   if (!body) return;
-  const reader = body.pipeThrough(new TextDecoderStream()).getReader();
+  const reader = body.getReader();
+  const decoder = new TextDecoder();
   let rest = "";
   for (;;) {
     const { done, value } = await reader.read();
     if (done) return;
-    const blocks = (rest + value).replaceAll("\r\n", "\n").split("\n\n");
+    const text = rest + decoder.decode(value, { stream: true });
+    const blocks = text.replaceAll("\r\n", "\n").split("\n\n");
     rest = blocks.pop() ?? "";
     for (const block of blocks) {
       const event = parse(block);

@@ -1,7 +1,12 @@
 import { describe, expect, test } from "vitest";
-import { parseNpy, toIndices } from "../src/api/npy";
-import { npyOf } from "./support/npy";
-import { Random } from "./support/random";
+import {
+  npyOf as npyOfDoubles,
+  parseNpy,
+  toDoubles,
+  toIntegers,
+} from "../../../../client/typescript/src/npy";
+import { npyOf } from "../support/npy";
+import { Random } from "../support/random";
 
 function bytesOf(base64: string): ArrayBuffer {
   return Uint8Array.from(atob(base64), (character) => character.charCodeAt(0)).buffer;
@@ -33,7 +38,7 @@ describe("files by NumPy", () => {
     const array = parseNpy(bytesOf(BY_NUMPY.version2));
     expect(array.data).toEqual(new BigInt64Array([0n, 1n, 2n, 3n, 4n, 5n]));
     expect(array.shape).toEqual([2, 3]);
-    expect(toIndices(array)).toEqual(new Uint32Array([0, 1, 2, 3, 4, 5]));
+    expect(toIntegers(array)).toEqual(new Int32Array([0, 1, 2, 3, 4, 5]));
   });
 
   test("a scalar has no dimension", () => {
@@ -71,10 +76,21 @@ describe("round trips", () => {
     }
   });
 
-  test("indices of 32 bits fit", () => {
-    const largest = 2 ** 32 - 1;
-    const array = parseNpy(npyOf(new BigInt64Array([0n, BigInt(largest)]), "<i8", [2]));
-    expect(toIndices(array)).toEqual(new Uint32Array([0, largest]));
+  test("indices of 31 bits, and -1 for none, fit", () => {
+    const largest = 2 ** 31 - 1;
+    const array = parseNpy(npyOf(new BigInt64Array([-1n, BigInt(largest)]), "<i8", [2]));
+    expect(toIntegers(array)).toEqual(new Int32Array([-1, largest]));
+  });
+
+  test("single precision becomes double", () => {
+    const array = parseNpy(npyOf(new Float32Array([0.5, Infinity]), "<f4", [2]));
+    expect(toDoubles(array)).toEqual(new Float64Array([0.5, Infinity]));
+  });
+
+  test.each([0, 1, 1000])("what is written is as NumPy would write it: %i doubles", async (n) => {
+    const doubles = Float64Array.from({ length: n }, (_, i) => 1 / i);
+    const written = await npyOfDoubles(doubles).arrayBuffer();
+    expect(new Uint8Array(written)).toEqual(new Uint8Array(npyOf(doubles, "<f8", [n])));
   });
 });
 

@@ -1,16 +1,18 @@
 // A queue of one: only the latest request is worth an answer.
-import { isAbort } from "./http";
+import { isAbort } from "../service";
 
 const PATIENCE_MS = 100;
 
 /**
  * Runs one request at a time. The latest one waits for the one that runs, and replaces any other
  * that waits. A request that has been superseded is aborted when it takes longer than the patience.
- * Each abort doubles the patience, so that a slow service still answers some requests.
+ * Each abort doubles the patience, so that a slow service still answers some requests. A request
+ * that only refines an answer is aborted at once.
  */
 export class LatestOnly<Q> {
   private running: AbortController | undefined;
   private waiting: Q | undefined;
+  private isRefining = false;
   private patience = PATIENCE_MS;
 
   constructor(
@@ -23,8 +25,15 @@ export class LatestOnly<Q> {
       void this.run(request);
       return;
     }
-    if (this.waiting === undefined) this.abortWhenOverdue(this.running);
+    if (this.isRefining) this.running.abort();
+    else if (this.waiting === undefined) this.abortWhenOverdue(this.running);
     this.waiting = request;
+  }
+
+  /** Tell whether to refine the answer that was just given: nobody has asked for another. */
+  refines(): boolean {
+    this.isRefining = this.waiting === undefined;
+    return this.isRefining;
   }
 
   /** Abort the request that runs, and drop the one that waits. */
@@ -45,6 +54,7 @@ export class LatestOnly<Q> {
   private async run(request: Q): Promise<void> {
     const running = new AbortController();
     this.running = running;
+    this.isRefining = false;
     try {
       await this.answer(request, running);
       this.patience = PATIENCE_MS;
