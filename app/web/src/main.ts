@@ -1,21 +1,28 @@
 // The page's parts and their wiring: users change the state, and every part follows it.
-import type { About, MeshDocument } from "geodesic-client";
+import type { About, MeshDocument, PathAnswer } from "geodesic-client";
 import { Borders } from "./ask/borders";
+import { Boundaries } from "./ask/boundaries";
 import { Fields } from "./ask/fields";
 import { Isolines } from "./ask/isolines";
+import { PathProofs } from "./ask/proofs";
 import { Rays } from "./ask/rays";
 import { Routes } from "./ask/routes";
 import { Walks } from "./ask/walks";
-import { byId } from "./dom";
+import { byId, written } from "./dom";
 import { Player } from "./film/player";
+import { positionOf } from "./mesh/picking";
 import { foldOnPhone, isDark, setFolded, setUpAppearance } from "./panel/appearance";
 import { Controls, located } from "./panel/controls";
+import { Cutting } from "./panel/cutting";
 import { ExportPanel } from "./panel/exportPanel";
 import { listenToKeys } from "./panel/keys";
 import { Meshes } from "./panel/meshes";
 import { Notes } from "./panel/notes";
+import { Numbers } from "./panel/numbers";
 import { PlaceList } from "./panel/placeList";
 import { Pointer } from "./panel/pointer";
+import { ProfileChart } from "./panel/profile";
+import { Regions } from "./panel/regions";
 import { showReport } from "./panel/report";
 import { service } from "./service";
 import { readSample, readState, writeState } from "./state/permalink";
@@ -41,31 +48,50 @@ const fields = new Fields(status, sceneView, notes);
 const isolines = new Isolines(status, sceneView, fields, notes);
 const borders = new Borders(status, sceneView, fields, notes);
 const rays = new Rays(status, sceneView, fields, notes);
+const boundaries = new Boundaries(status, sceneView, notes);
 const walks = new Walks(status, sceneView, notes);
 const routes = new Routes(status, sceneView, notes);
 const meshes = new Meshes(store, status);
 const controls = new Controls(store, status, sceneView, notes);
 const placeList = new PlaceList(store);
+const proofs = new PathProofs(store, status, () => sceneView.mesh);
+const profile = new ProfileChart((position) => sceneView.showSpot(position));
+const numbers = new Numbers(store, status, () => sceneView.mesh?.document ?? null);
+const cutting = new Cutting(
+  store,
+  status,
+  notes,
+  () => ({
+    path: routes.outline,
+    walk: walks.line,
+    largest: fields.of(store.state)?.largest ?? 0,
+    up: sceneView.mesh?.frame.up ?? null,
+    view: stage.view,
+  }),
+  () => meshes.list(),
+);
+new Regions(store, status, notes);
 const exportPanel = new ExportPanel(store, status, stage);
 const player = new Player(store, status, sceneView, () => {
   fields.paint(store.state);
   void showWires(store.state);
 });
 const pointer = new Pointer(sceneView, store, () => controls.tool);
-pointer.onHover = (point) => fields.tell(point, store.state);
+pointer.onHover = (point) => {
+  fields.tell(point, store.state);
+  tellWhere(sceneView.mesh && point && positionOf(sceneView.mesh, point));
+};
+isolines.onDraw = () => sceneView.showLevels(store.state);
 listenToKeys(store, status, sceneView, pointer);
 drawRamp(store.state.palette);
 exportPanel.largest = () => fields.of(store.state)?.largest ?? 0;
 exportPanel.nearest = () => routes.source;
 exportPanel.drawn = () => {
   const { mesh } = sceneView;
-  const { palette, range } = store.state;
-  const field = fields.of(store.state);
   const path = routes.outline?.points ?? [];
   return (
     mesh && {
-      ...{ mesh, palette },
-      field: field && { values: field.distances, largest: range ?? field.largest },
+      ...{ mesh, palette: store.state.palette, field: fields.scale(store.state) },
       lines: [
         ...(path.length > 1 ? [{ name: "path", points: path, colour: ROUTE }] : []),
         ...isolines.lines.map(({ points }) => ({
@@ -76,11 +102,18 @@ exportPanel.drawn = () => {
   );
 };
 controls.usualSpacing = () => Number(((exportPanel.largest() || 1) / 20).toPrecision(1));
+meshes.onNumbers = (file) => numbers.take(file);
+routes.onDraw = (outline) => {
+  proofs.follow(outline);
+  showProfile(outline);
+  cutting.show();
+};
 stage.onMove = (view) => store.replace({ view, up: sceneView.mesh?.frame.up ?? null });
 fields.onPaint = (state) => {
   isolines.follow(state);
   borders.follow(state);
   rays.follow(state);
+  cutting.show();
   player.redraw();
   pointer.rehover();
 };
@@ -95,7 +128,11 @@ const stories = byId("stories", HTMLDetailsElement);
 let report: MeshDocument | null = null;
 
 store.listen((state, before) => {
-  if (state.mesh !== null && (state.mesh !== before.mesh || isTurned(state))) open(state.mesh);
+  if (
+    state.mesh !== null &&
+    (state.mesh !== before.mesh || isTurned(state) || isUnrolled(state, before))
+  )
+    open(state.mesh);
   if (state.mesh !== before.mesh || pointer.wasExample(before)) makeRoom();
   if (state.places !== before.places) notes.tell("points", []);
   controls.show(state);
@@ -104,12 +141,18 @@ store.listen((state, before) => {
   fields.follow(state);
   routes.follow(state);
   walks.follow(state);
+  boundaries.follow(state);
+  numbers.show(state);
+  cutting.show();
   player.follow(state);
   if (state.unit !== before.unit) nameUnit(state);
-  if (state.range !== before.range) fields.paint(state);
+  const paints = ["range", "least", "values"] as const;
+  if (paints.some((each) => state[each] !== before[each])) fields.paint(state);
   if (state.palette !== before.palette) showPalette(state);
   if (state.lines !== before.lines) isolines.follow(state);
   if (state.polar !== before.polar) rays.follow(state);
+  if (state.labels !== before.labels) sceneView.showLevels(state);
+  if (state.flat !== before.flat || state.section !== before.section) sceneView.showLook(state);
   if (state.wireframe !== before.wireframe) void showWires(state);
   if (sceneView.mesh) sceneView.showPoints(state);
   if (state.barriers !== before.barriers || state.isReadable !== before.isReadable)
@@ -130,6 +173,17 @@ function nameUnit(state: State): void {
   if (report) showReport(report, sceneView, unitOf(state), meshes.joiningOf(report.id));
 }
 
+/** Tell the coordinates of the position under the pointer; null: none. */
+function tellWhere(position: readonly number[] | null): void {
+  byId("where").hidden = position === null;
+  const named = position?.map((x, axis) => `${"xyz"[axis]} ${written(x, 4)}`);
+  byId("where").textContent = named?.join("  ") ?? "";
+}
+
+function showProfile(outline: PathAnswer | null): void {
+  profile.show(outline, sceneView.mesh?.frame.up ?? "y", unitOf(store.state));
+}
+
 function showPalette({ palette }: State): void {
   drawRamp(palette);
   sceneView.surface?.setPalette(palette);
@@ -142,6 +196,18 @@ function isTurned({ up }: State): boolean {
   return drawn !== undefined && up !== null && up !== drawn;
 }
 
+/** Whether the surface is to be unrolled, or rolled up, otherwise than before. */
+function isUnrolled(state: State, before: State): boolean {
+  const asked = (each: State): string => JSON.stringify(each.unroll && unrollingOf(each));
+  return asked(state) !== asked(before);
+}
+
+function unrollingOf({ places, barriers, maxDistance }: State) {
+  const [first] = places;
+  if (!first) return null;
+  return { source: first.point, barriers, maxDistance };
+}
+
 /** Load a mesh, and draw on it the answers that have arrived by then. */
 function open(mesh: string): void {
   opening.abort();
@@ -151,15 +217,24 @@ function open(mesh: string): void {
   isolines.forget();
   borders.forget();
   rays.forget();
+  boundaries.forget();
   report = null;
   notes.begin(report);
   showReport(report, sceneView, "", null);
   const stop = new AbortController();
   opening = stop;
-  status.run("loading", "Loading the mesh…", stop, async () => {
+  status.run("loading", "Loading the mesh…", stop, async (onProgress) => {
     const document = await service.mesh(mesh, { signal: stop.signal });
     await sceneView.open(document, store.state.up, stop.signal);
     stop.signal.throwIfAborted();
+    const unrolling = store.state.unroll ? unrollingOf(store.state) : null;
+    if (unrolling) {
+      const { source, ...question } = unrolling;
+      const call = { onProgress, signal: stop.signal };
+      const logMap = await service.logMap(mesh, source, { ...question, ...call });
+      stop.signal.throwIfAborted();
+      sceneView.unroll(logMap);
+    }
     controls.showUp(sceneView.mesh?.frame.up ?? "y");
     const now = store.state;
     if (now.view) stage.look(now.view);
@@ -173,7 +248,9 @@ function open(mesh: string): void {
     fields.paint(now);
     routes.draw();
     walks.draw();
+    boundaries.follow(now);
     showPalette(now);
+    sceneView.showLook(now);
     await showWires(now);
   });
 }

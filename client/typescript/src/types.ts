@@ -20,6 +20,7 @@ export type Problem = Schemas["ProblemDocument"];
 export type ResolvedPoint = Schemas["ResolvedPoint"];
 export type Step = Schemas["SearchStep"];
 export type StraightLine = Schemas["StraightLine"];
+export type SurfaceCost = Schemas["SurfaceCost"];
 export type SurfaceCurve = Schemas["SurfaceCurve"];
 export type SweepAnswer = Schemas["SweepAnswer"];
 export type Unreachable = Schemas["Unreachable"];

@@ -1,4 +1,4 @@
-// Borders of territories: requested when the surface is coloured by them, then drawn.
+// Borders and areas of territories: requested when the surface is coloured by them, then shown.
 import type { Question } from "geodesic-client";
 import type { Notes } from "../panel/notes";
 import { service } from "../service";
@@ -6,7 +6,7 @@ import type { State } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
 import { Drawing } from "./drawing";
-import { type Fields, questionOf } from "./fields";
+import { type Fields, questionOf, shadeOf } from "./fields";
 
 export class Borders {
   private readonly drawing: Drawing;
@@ -23,9 +23,9 @@ export class Borders {
 
   /** Request the borders that `state` shows and that are not drawn yet, and draw them. */
   follow(state: State): void {
-    const { mesh, starts, shade } = state;
+    const { mesh, starts } = state;
     const nearest = this.fields.territories(state);
-    const isDrawn = starts > 1 && shade === "territories" && this.sceneView.surface;
+    const isDrawn = starts > 1 && shadeOf(state) === "territories" && this.sceneView.surface;
     if (!mesh || !nearest || !isDrawn) {
       this.drawing.clear();
       return;
@@ -33,14 +33,13 @@ export class Borders {
     const question = bordersOf(state);
     this.drawing.follow(JSON.stringify([mesh, question]), async (onProgress, signal) => {
       const { sources, ...rest } = question;
-      const { borders, warnings } = await service.borders(mesh, sources, {
-        ...rest,
-        onProgress,
-        signal,
-      });
+      const asked = { ...rest, onProgress, signal };
+      const { borders, warnings } = await service.borders(mesh, sources, asked);
+      const cells = await service.cells(mesh, sources, asked);
       return () => {
         this.sceneView.showBorders(nearest, borders);
-        this.notes.tell("borders", warnings);
+        this.fields.tellAreas(cells.areas, state);
+        this.notes.tell("borders", [...warnings, ...cells.warnings]);
       };
     });
   }
@@ -53,6 +52,6 @@ export class Borders {
 
 /** Return a question for borders, which are exact by any method. */
 export function bordersOf(state: State): Question<"borders"> {
-  const { method: _, ...question } = questionOf(state, "exact");
+  const { method: _, ...question } = questionOf({ ...state, slope: null, tolls: null }, "exact");
   return question;
 }

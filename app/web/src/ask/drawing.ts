@@ -12,7 +12,7 @@ export class Drawing {
   constructor(
     private readonly status: Status,
     private readonly notes: Notes,
-    private readonly what: "isolines" | "borders" | "rays",
+    private readonly what: "isolines" | "borders" | "rays" | "boundary",
     private readonly hideLines: () => void,
   ) {}
 

@@ -11,14 +11,24 @@ import type {
 import { byId, count, duration, written } from "../dom";
 import type { LoadedMesh } from "../mesh/loader";
 import type { FacePoint } from "../mesh/picking";
+import { extremesOf } from "../mesh/values";
 import type { Notes } from "../panel/notes";
 import { service } from "../service";
 import { nameOf, startsOf } from "../state/places";
-import { INITIAL, type State, unitOf } from "../state/state";
+import { INITIAL, type Shade, type State, unitOf } from "../state/state";
 import { PATIENCE_MS, type Status } from "../status";
-import { hideLegend, showHere, showProof, showScale, showTerritories } from "../view/legend";
+import { huesOf } from "../view/hues";
+import {
+  hideLegend,
+  showDifference,
+  showHere,
+  showProof,
+  showScale,
+  showTerritories,
+} from "../view/legend";
 import type { SceneView } from "../view/sceneView";
 import type { Surface } from "../view/surface";
+import { costKey, costOf, hasCost, measureOf } from "./costs";
 import { LatestOnly } from "./latestOnly";
 
 /** Distances to all vertices, infinite where unreachable. */
@@ -36,7 +46,7 @@ interface Proof {
 /** Faces from which exact distances take noticeably longer than fast ones. */
 const MANY_FACES = 50_000;
 
-/** Answers for one set of sources, barriers and limit. */
+/** Answers for one set of sources, barriers, limit and cost. Of costs there is one method only. */
 interface Answers {
   key: string;
   exact?: Field;
@@ -48,6 +58,8 @@ interface Answers {
   error?: number;
   effort?: Effort;
   nearest?: Int32Array;
+  /** Areas of the territories. */
+  areas?: number[];
   proofs: Partial<Record<Method, Proof>>;
 }
 
@@ -80,7 +92,7 @@ export class Fields {
 
   /** Return the field that was asked for, once it is there. */
   of(state: State): Field | null {
-    return isAsked(state) ? (this.answersTo(state)[state.method] ?? null) : null;
+    return isAsked(state) ? (this.answersTo(state)[methodOf(state)] ?? null) : null;
   }
 
   /** Return the field that is drawn: a rough one until then. */
@@ -103,14 +115,28 @@ export class Fields {
 
   /** Return the nearest source of each vertex, where it is drawn; else null. */
   territories(state: State): Int32Array | null {
-    return state.shade === "territories" ? (this.answersTo(state).nearest ?? null) : null;
+    return shadeOf(state) === "territories" ? (this.answersTo(state).nearest ?? null) : null;
+  }
+
+  /** Return the numbers that colour the surface, with the ends of their scale; null: none. */
+  scale(state: State): Scale | null {
+    const field = this.of(state);
+    return state.values || field ? scaleOf(state, field) : null;
+  }
+
+  /** Tell the areas of the territories that are drawn. */
+  tellAreas(areas: number[], state: State): void {
+    const answers = this.answersTo(state);
+    answers.areas = areas;
+    this.showTerritories(state, answers);
   }
 
   /** Request what ``state`` needs and has not been answered yet, and paint it. */
   follow(state: State): void {
     this.state = state;
-    const { mesh, method, error, effort, shade } = state;
-    const requested = JSON.stringify([keyOf(state), method, error, effort, shade]);
+    const { mesh, error, effort } = state;
+    const asked = [keyOf(state), methodOf(state), error, effort, shadeOf(state), versusOf(state)];
+    const requested = JSON.stringify(asked);
     if (requested === this.requested) return;
     this.requested = requested;
     const isQuestion = mesh !== null && isAsked(state) && startsOf(state).length > 0;
@@ -150,10 +176,13 @@ export class Fields {
   }
 
   /** Whether a rough answer is worth while. */
-  private takesLong({ method, shade }: Asked, answers: Answers): boolean {
+  private takesLong(asked: Asked, answers: Answers): boolean {
+    const { method } = asked;
+    const shade = shadeOf(asked);
     const faces = this.sceneView.mesh?.document.faces ?? 0;
     const isPlain = shade === "distance" || shade === "territories";
-    return faces >= MANY_FACES && isPlain && method !== "fast" && !answers[method];
+    const isQuick = method === "fast" || hasCost(asked); // of costs there is no rough answer
+    return faces >= MANY_FACES && isPlain && !isQuick && !answers[method];
   }
 
   /** Paint answers, also those for points that have been pulled on meanwhile, for a moment. */
@@ -163,7 +192,8 @@ export class Fields {
       this.answers = answers;
       this.paint(this.state);
     } else if (isPulled(asked, this.state) && surface && mesh) {
-      const field = answers[asked.method] ?? answers.rough;
+      const field = answers[methodOf(asked)] ?? answers.rough;
+      blank(surface);
       if (field) this.paintField(surface, mesh, field, asked, answers);
       clearTimeout(this.clearing);
       this.clearing = setTimeout(() => this.paint(this.state), PATIENCE_MS);
@@ -174,8 +204,9 @@ export class Fields {
 
   private async fetchMissing(answers: Answers, state: Asked, call: Call): Promise<void> {
     const { mesh } = state;
-    const isCompared = state.shade === "difference";
-    const methods: Method[] = isCompared ? ["exact", roughOf(state)] : [state.method];
+    const shade = shadeOf(state);
+    const asked = methodOf(state);
+    const methods = shade === "difference" ? [asked, versusOf(state)] : [asked];
     for (const method of methods) {
       if (answers[method]) continue;
       const { sources, ...question } = questionOf(state, method);
@@ -183,11 +214,11 @@ export class Fields {
       if (method === "approximate") answers.error = state.error;
       if (method === "fast") answers.effort = state.effort;
     }
-    if (state.shade === "territories") {
+    if (shade === "territories") {
       // Borders are exact in any case.
       answers.nearest ??= await askTerritories(mesh, questionOf(state, "exact"), call);
     }
-    if (state.shade === "proof" && state.method !== "fast") {
+    if (shade === "proof" && state.method !== "fast") {
       const question = questionOf(state, state.method);
       answers.proofs[state.method] ??= await askProof(mesh, question, call);
     }
@@ -201,10 +232,14 @@ export class Fields {
     const field = this.shown(state);
     this.compare(this.answersTo(state));
     if (!surface || !mesh) return;
+    blank(surface);
     this.notes.tell("distances", field ? notesOn(field, state) : []);
-    if (field) this.paintField(surface, mesh, field, state, this.answers);
+    if (state.values) {
+      const { values, least, largest } = scaleOf(state, null);
+      surface.setValues(values, largest, least);
+      showScale(state.values.name, largest, least);
+    } else if (field) this.paintField(surface, mesh, field, state, this.answers);
     else {
-      surface.setTerritories(null);
       surface.setValues(null, 1);
       hideLegend();
     }
@@ -219,48 +254,70 @@ export class Fields {
     state: State,
     answers: Answers,
   ): void {
-    const { shade, starts } = state;
-    const { exact, nearest } = answers;
-    const rough = answers[roughOf(state)];
-    const proof = answers.proofs[state.method];
-    surface.setTerritories(null);
-    showProof(proof ? proofInWords(proof.certificate) : null);
+    const shade = shadeOf(state);
+    const { nearest } = answers;
+    const method = methodOf(state);
+    const other = answers[versusOf(state)];
+    const proof = answers.proofs[method];
+    showProof(proof && !hasCost(state) ? proofInWords(proof.certificate) : null);
     if (shade === "proof" && proof) {
       const violations = atVertices(proof.violations, mesh);
       surface.setValues(violations, proof.certificate.worst_violation);
       showScale(`Violation by face, ${unitOf(state)}`, proof.certificate.worst_violation);
       return;
     }
-    if (shade === "difference" && exact && rough) {
-      const errors = errorsOf(exact, rough);
-      const largest = largestOf(errors);
-      surface.setValues(errors, largest);
-      const bound = `${rough.error_bound.kind}: ${written(100 * rough.error_bound.value, 3)}`;
-      showScale(`Error, % (${bound})`, largest);
+    if (shade === "difference" && other) {
+      const { values, largest, mean } = differenceOf(field, other);
+      surface.setValues(values, largest);
+      showScale(`|${method} − ${versusOf(state)}| in ${unitOf(state)}`, largest);
+      const share = mean / (field.largest || 1);
+      showDifference(
+        `Largest ${written(largest, 3)}, mean ${written(mean, 3)} (${percent(share)} of the largest distance)`,
+      );
       return;
     }
-    const largest = state.range ?? field.largest;
-    surface.setValues(field.distances, largest);
+    const { values, least, largest } = scaleOf(state, field);
+    surface.setValues(values, largest, least);
     if (shade === "territories" && nearest) {
-      surface.setTerritories(nearest);
-      showTerritories(Array.from({ length: starts }, (_, i) => nameOf(state, i)));
+      const hues = huesOf(state.starts, nearest, mesh);
+      this.sceneView.hues = hues;
+      surface.setTerritories(nearest.map((source) => hues[source] ?? source));
+      this.sceneView.showPoints(this.state);
+      this.showTerritories(state, answers);
     } else {
-      const isRough = field === answers.rough;
-      showScale(`${isRough ? "Rough distance" : "Distance"} in ${unitOf(state)}`, largest);
+      const isRough = method === "fast" || field === answers.rough;
+      const what = hasCost(state) ? "Cost" : isRough ? "Rough distance" : "Distance";
+      showScale(`${what} in ${measureOf(state)}`, largest, least);
     }
+  }
+
+  private showTerritories(state: State, { areas }: Answers): void {
+    const whole = areas?.reduce((sum, area) => sum + area, 0) ?? 0;
+    showTerritories(
+      Array.from({ length: state.starts }, (_, i) => {
+        const area = areas?.[i];
+        return {
+          name: nameOf(state, i),
+          area: area === undefined ? "" : `${written(area, 4)} (${percent(area / whole)})`,
+          colour: this.sceneView.colourOf(i),
+        };
+      }),
+      state.unit && ` in ${state.unit}²`,
+    );
   }
 
   /** Tell the distance at a point, interpolated within its face; null: nowhere. */
   tell(point: FacePoint | null, state: State): void {
-    const field = this.shown(state);
+    const numbers = state.values?.numbers ?? this.shown(state)?.distances;
     const mesh = this.sceneView.mesh;
-    const isTold = point && field && mesh && !["difference", "proof"].includes(state.shade);
+    const isTold = point && numbers && mesh && !["difference", "proof"].includes(shadeOf(state));
     const value = isTold
       ? mesh
           .corners(point.face)
-          .reduce((sum, v, i) => sum + (point.barycentric[i] ?? 0) * (field.distances[v] ?? NaN), 0)
+          .reduce((sum, v, i) => sum + (point.barycentric[i] ?? 0) * (numbers[v] ?? NaN), 0)
       : Number.NaN;
-    showHere(Number.isFinite(value) ? `≈ ${written(value, 4)} ${unitOf(state)} here` : null);
+    const unit = state.values ? "" : ` ${measureOf(state)}`;
+    showHere(Number.isFinite(value) ? `≈ ${written(value, 4)}${unit} here` : null);
   }
 
   /** Show time and error of all methods side by side. */
@@ -275,6 +332,27 @@ export class Fields {
         exact && rough ? percent(largestOf(errorsOf(exact, rough)) / 100) : "–";
     }
   }
+}
+
+/** Numbers of the vertices, and those of the first and the last colour. */
+export interface Scale {
+  values: Float64Array;
+  least: number;
+  largest: number;
+}
+
+/** Return the scale of the values of a file where there are some, otherwise of a field. */
+function scaleOf({ values, least, range }: State, field: Field | null): Scale {
+  const numbers = values?.numbers ?? field?.distances ?? new Float64Array();
+  const [low, high] = values ? extremesOf(values.numbers) : [0, field?.largest ?? 0];
+  return { values: numbers, least: least ?? low, largest: range ?? high };
+}
+
+/** Take territories, proof and difference away. */
+function blank(surface: Surface): void {
+  surface.setTerritories(null);
+  showProof(null);
+  showDifference(null);
 }
 
 export function fieldOf(answer: Distances): Field {
@@ -307,29 +385,47 @@ async function askTerritories(
 /** Return what answers belong to. */
 function keyOf(state: State): string {
   const { mesh, barriers, maxDistance } = state;
-  return JSON.stringify([mesh, isAsked(state) ? startsOf(state) : [], barriers, maxDistance]);
+  const sources = isAsked(state) ? startsOf(state) : [];
+  return JSON.stringify([mesh, sources, barriers, maxDistance, costKey(state)]);
 }
 
 /** Whether two states ask for distances that differ by where the sources are at most. */
 function isPulled(before: State, now: State): boolean {
-  const fixed = ({ mesh, barriers, maxDistance, method, shade, starts }: State): string =>
-    JSON.stringify([mesh, barriers, maxDistance, method, shade, starts]);
+  const fixed = (state: State): string => {
+    const { mesh, barriers, maxDistance, starts } = state;
+    const colours = [methodOf(state), shadeOf(state), versusOf(state), costKey(state)];
+    return JSON.stringify([mesh, barriers, maxDistance, starts, colours]);
+  };
   return isAsked(now) && startsOf(now).length > 0 && fixed(before) === fixed(now);
 }
 
-function isAsked({ distances, isReadable }: State): boolean {
-  return distances && isReadable;
+function isAsked({ distances, isReadable, values }: State): boolean {
+  return distances && isReadable && !values;
 }
 
-type FieldQuestion = Pick<
-  Question<"distances">,
-  "sources" | "method" | "relativeError" | "effort" | "maxDistance" | "barriers"
->;
+/** Return what the surface is coloured by: costs have no other colours than their own. */
+export function shadeOf(state: State): Shade {
+  return hasCost(state) ? "distance" : state.shade;
+}
 
-/** Return a question for distances. */
-export function questionOf(state: State, method: Method): FieldQuestion {
+function methodOf(state: State): Method {
+  return hasCost(state) ? "exact" : state.method;
+}
+
+type FieldQuestion<M extends Method = Method> = Pick<
+  Question<"distances">,
+  "sources" | "relativeError" | "effort" | "maxDistance" | "barriers" | "cost"
+> & { method?: M };
+
+/** Return a question for distances, or for costs: of these there is no other method. */
+export function questionOf<M extends Method>(state: State, method: M): FieldQuestion<M> {
+  const sources = startsOf(state);
+  const cost = costOf(state);
+  if (cost) {
+    return { sources, cost, ...(state.barriers.length > 0 ? { barriers: state.barriers } : {}) };
+  }
   return {
-    sources: startsOf(state),
+    sources,
     method,
     ...(method === "approximate" ? { relativeError: state.error } : {}),
     ...(method === "fast" ? { effort: state.effort } : {}),
@@ -338,22 +434,25 @@ export function questionOf(state: State, method: Method): FieldQuestion {
   };
 }
 
-/** Return the method that is compared with the exact one. */
-function roughOf({ method }: State): Exclude<Method, "exact"> {
-  return method === "exact" ? "approximate" : method;
+/** Return the method that the one of the question is compared with. */
+export function versusOf({ method, versus }: State): Method {
+  if (versus !== null && versus !== method) return versus;
+  return method === "exact" ? "approximate" : "exact";
 }
 
 /** Return what there is to know about a field but its colours. */
-function notesOn(
-  { error_bound, unreachable, warnings }: Field,
-  { method, shade }: State,
-): string[] {
+function notesOn({ error_bound, unreachable, warnings }: Field, state: State): string[] {
+  const { method, shade } = state;
   const { disconnected, beyond_max_distance } = unreachable;
   const isExact = method === "exact" && error_bound.value === 0;
   const said = (n: number, what: string): string[] =>
     n > 0 ? [`${count(n, "vertex", "vertices")} ${what}`] : [];
   return [
-    ...(isExact ? [] : [`Distances: ${boundInWords(error_bound)}.`]),
+    ...(hasCost(state)
+      ? [`Costs: ${boundInWords(error_bound)}.`]
+      : isExact
+        ? []
+        : [`Distances: ${boundInWords(error_bound)}.`]),
     ...(shade === "proof" && method === "fast"
       ? ["Fast distances have no proof: choose another method."]
       : []),
@@ -368,8 +467,11 @@ export function boundInWords({ value, kind, type }: ErrorBound): string {
   return `error ${kind === "estimated" ? "about" : "at most"} ${size} (${kind})`;
 }
 
-function proofInWords({ holds, relative_gap, worst_face }: Certificate): string {
-  const size = `${relative_gap.toExponential(0)} of the largest distance`;
+export function proofInWords(
+  { holds, relative_gap, worst_face }: Certificate,
+  of = "the largest distance",
+): string {
+  const size = `${relative_gap.toExponential(0)} of ${of}`;
   return holds ? `✓ Proved to ${size}` : `Not proved: ${size} in doubt, most at face ${worst_face}`;
 }
 
@@ -391,6 +493,16 @@ function errorsOf(exact: Field, rough: Field): Float64Array {
     if (distance === Infinity || found === Infinity) return -1;
     return distance > 0 ? (100 * Math.abs(distance - found)) / distance : 0;
   });
+}
+
+/** Return by how much distances differ, infinite where unreachable; the largest and the mean. */
+function differenceOf(a: Field, b: Field): { values: Float64Array; largest: number; mean: number } {
+  const values = a.distances.map((distance, i) =>
+    distance === Infinity ? Infinity : Math.abs(distance - (b.distances[i] ?? Number.NaN)),
+  );
+  const known = values.filter(Number.isFinite);
+  const mean = known.reduce((sum, x) => sum + x, 0) / (known.length || 1);
+  return { values, largest: largestOf(known), mean };
 }
 
 function largestOf(values: Float64Array): number {

@@ -8,6 +8,7 @@ import { type Point, pointOf } from "../state/point";
 import type { State } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
+import { hasCost } from "./costs";
 import { Drawing } from "./drawing";
 import { type Fields, questionOf } from "./fields";
 
@@ -35,7 +36,7 @@ export class Rays {
     const { mesh, barriers, polar } = state;
     const sources = startsOf(state);
     const largest = this.fields.of(state)?.largest ?? 0;
-    if (!mesh || !polar || largest === 0 || !this.sceneView.surface) {
+    if (!mesh || !polar || hasCost(state) || largest === 0 || !this.sceneView.surface) {
       this.drawing.clear();
       return;
     }
@@ -61,7 +62,10 @@ export class Rays {
       });
       return () =>
         this.sceneView.showRays(
-          traced.map(({ points }, i) => ({ points: points?.slice(0, counts[i]) ?? [] })),
+          traced.map(({ points, faces }, i) => ({
+            points: points?.slice(0, counts[i]) ?? [],
+            faces,
+          })),
         );
     });
   }

@@ -1,7 +1,9 @@
 // The path to the target, which follows the pointer: fast at first, and the shortest once the
 // pointer rests. And the steps of its search.
-import type { PathAnswer, Step } from "geodesic-client";
+import type { PathAnswer, Step, SurfaceCost } from "geodesic-client";
 import { byId, count, written } from "../dom";
+import { InputError } from "../inputError";
+import { differences } from "../mesh/frame";
 import type { Notes } from "../panel/notes";
 import { service } from "../service";
 import { endOf, nameOf, startsOf, stopsOf } from "../state/places";
@@ -9,6 +11,7 @@ import { type Point, pointOf, writePoint } from "../state/point";
 import { type State, unitOf } from "../state/state";
 import { PATIENCE_MS, type Status } from "../status";
 import type { SceneView } from "../view/sceneView";
+import { costKey, costOf, measureOf } from "./costs";
 import { boundInWords } from "./fields";
 import { LatestOnly } from "./latestOnly";
 
@@ -19,7 +22,7 @@ export interface RouteQuestion {
   barriers: number[];
 }
 
-type RouteRequest = RouteQuestion & { mesh: string };
+type RouteRequest = RouteQuestion & { mesh: string; cost: SurfaceCost | null };
 
 const WORDS: Record<Step["name"], string> = {
   dijkstra: "A path along edges: a first bound",
@@ -32,8 +35,11 @@ const WORDS: Record<Step["name"], string> = {
 
 export class Routes {
   outline: PathAnswer | null = null;
+  /** Called when another path, or none, is drawn. */
+  onDraw: (outline: PathAnswer | null) => void = () => undefined;
   private requested = "";
   private unit = "";
+  private measure = "";
   private names: string[] = [];
   private steps: Step[] = [];
   private request: RouteRequest | null = null;
@@ -65,16 +71,19 @@ export class Routes {
     const { mesh, barriers, isReadable } = state;
     const [sources, target, waypoints] = [startsOf(state), endOf(state), stopsOf(state)];
     this.unit = unitOf(state);
+    this.measure = measureOf(state);
     this.names = state.places.map((_, i) => nameOf(state, i)).slice(state.starts - 1);
     if (state.starts > 1) this.names[0] = "nearest start";
     this.note();
-    const requested = JSON.stringify([mesh, sources, target, waypoints, barriers, isReadable]);
+    const cost = costOf(state);
+    const asked = [mesh, sources, target, waypoints, barriers, isReadable];
+    const requested = JSON.stringify([...asked, cost && costKey(state), cost?.max_cost]);
     if (requested === this.requested) return;
     this.requested = requested;
     this.endSteps();
     const hasPath = mesh !== null && target !== null && isReadable;
-    this.request = hasPath ? { mesh, sources, target, waypoints, barriers } : null;
-    byId("explain-start", HTMLButtonElement).disabled = !hasPath;
+    this.request = hasPath ? { mesh, sources, target, waypoints, barriers, cost } : null;
+    byId("explain-start", HTMLButtonElement).disabled = !hasPath || cost !== null;
     if (this.request) {
       this.latestOnly.ask(this.request);
       this.clearSoon();
@@ -106,11 +115,16 @@ export class Routes {
   /** Draw the path that was found; a mesh that was just loaded shows none yet. */
   draw(): void {
     this.sceneView.showRoute(this.outline);
+    this.onDraw(this.outline);
   }
 
   private async answer(request: RouteRequest, signal: AbortSignal): Promise<void> {
-    const { mesh, ...question } = request;
+    const { mesh, cost, ...question } = request;
     try {
+      if (cost) {
+        this.show(await cheapest(mesh, question, cost, signal), request);
+        return;
+      }
       const refines = () => this.latestOnly.refines();
       for await (const outline of askRoute(mesh, question, signal, refines)) {
         this.show(outline, request);
@@ -133,25 +147,28 @@ export class Routes {
     const readout = byId("readout");
     readout.hidden = false;
     readout.dataset.target = writePoint(request.target);
-    const { length } = outline;
-    byId("length").textContent = length == null ? "No path" : written(length, 6);
+    const shown = outline.cost ?? outline.length;
+    byId("length").textContent = shown == null ? "No path" : written(shown, 6);
     this.note();
   }
 
   private note(): void {
     const { outline, unit } = this;
     if (!outline) return;
-    const bound =
-      outline.method === "exact" ? "exact" : `rough: ${boundInWords(outline.error_bound)}`;
-    byId("length-note").textContent =
-      outline.length == null ? reason(outline) : `${unit}, ${bound}`;
+    const isExact = outline.method === "exact";
+    const error = boundInWords(outline.error_bound);
+    const words =
+      outline.cost == null
+        ? `${unit}, ${isExact ? "exact" : `rough: ${error}`}; ${written(straight(outline), 6)} straight`
+        : `${this.measure}, ${isExact ? "exact" : error}; ${written(outline.length ?? 0, 6)} ${unit} long`;
+    byId("length-note").textContent = outline.length == null ? reason(outline) : words;
     byId("length-names").textContent = this.names.join(" → ");
   }
 
   private explain(): void {
     const { request } = this;
     if (!request) return;
-    const { mesh, ...question } = request;
+    const { mesh, cost: _, ...question } = request;
     const stop = new AbortController();
     this.status.run("busy", "Searching step by step…", stop, async () => {
       const { target, waypoints, barriers } = question;
@@ -191,6 +208,34 @@ export class Routes {
     byId("explain-start").hidden = false;
     this.sceneView.region.show(null, []);
   }
+}
+
+/** Return how far the ends of a path are apart in space. */
+function straight({ points }: PathAnswer): number {
+  const [first, last] = [points?.at(0), points?.at(-1)];
+  return first && last ? Math.hypot(...differences(last, first)) : 0;
+}
+
+/** Return the cheapest path from the source from where it is cheapest. */
+async function cheapest(
+  mesh: string,
+  { sources, target, waypoints, barriers }: RouteQuestion,
+  cost: SurfaceCost,
+  signal: AbortSignal,
+): Promise<PathAnswer> {
+  if (waypoints.length > 0) {
+    throw new InputError(
+      "No stops on the cheapest path",
+      "The service finds cheapest paths from one point to another only.",
+      "Remove the stops, or the cost.",
+    );
+  }
+  const call = { barriers, cost, signal };
+  const found = await Promise.all(
+    sources.map((source) => service.path(mesh, source, target, call)),
+  );
+  const costFrom = ({ cost: each }: PathAnswer): number => each ?? Infinity;
+  return found.reduce((best, each) => (costFrom(each) < costFrom(best) ? each : best));
 }
 
 /**
@@ -234,11 +279,12 @@ async function nearestSource(
 function isPulled(before: RouteRequest, now: RouteRequest): boolean {
   const fixed = ({ mesh, sources, barriers }: RouteRequest): string =>
     JSON.stringify([mesh, sources, barriers]);
-  return fixed(before) === fixed(now);
+  return fixed(before) === fixed(now) && (before.cost === null) === (now.cost === null);
 }
 
 function reason({ reason: code }: PathAnswer): string {
-  return code === "disconnected"
-    ? "start and end are not connected"
+  if (code === "disconnected") return "start and end are not connected";
+  return code === "beyond_max_cost"
+    ? "the end costs more than the limit"
     : "the end is farther than the distance limit";
 }

@@ -29,7 +29,7 @@ const ENDS: Record<StraightLine["stopped"], string> = {
 export class Walks {
   private requested = "";
   private request: WalkRequest | null = null;
-  private line: StraightLine | null = null;
+  line: StraightLine | null = null;
   private unit = "";
   private readonly latestOnly: LatestOnly<WalkRequest>;
 
@@ -69,7 +69,7 @@ export class Walks {
 
   /** Draw the line that was found; a mesh that was just loaded shows none yet. */
   draw(): void {
-    this.sceneView.showWalk(this.line?.points ?? []);
+    this.sceneView.showWalk(this.line);
   }
 
   private async answer(request: WalkRequest, signal: AbortSignal): Promise<void> {

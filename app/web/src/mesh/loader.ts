@@ -8,6 +8,7 @@ import { InputError } from "../inputError";
 import { service } from "../service";
 import type { Point } from "../state/point";
 import { drawnIn, type Frame, type Up } from "./frame";
+import type { Plane } from "./plane";
 
 type Triple = [number, number, number];
 
@@ -42,6 +43,8 @@ export class LoadedMesh {
   readonly geometry = new BufferGeometry();
   /** The tree for picking, which the worker builds last. */
   readonly tree: Promise<MeshBVH>;
+  /** Where the surface is unrolled; null: it is as it is in space. */
+  plane: Plane | null = null;
   private edges: Promise<Uint32Array<ArrayBuffer>> | undefined;
 
   constructor(
@@ -95,6 +98,27 @@ export class LoadedMesh {
     return drawnIn(this.frame, position);
   }
 
+  /** The geometry that is drawn: of the surface, or of its plane. */
+  get shown(): BufferGeometry {
+    return this.plane?.geometry ?? this.geometry;
+  }
+
+  /** Return where a vertex is drawn. */
+  drawnVertex(index: number): Triple {
+    return this.plane?.vertex(index) ?? this.drawn(this.vertex(index));
+  }
+
+  /** Return the polylines that draw one on the surface; ``faces`` has the face of each segment. */
+  drawnLines(
+    points: readonly (readonly number[])[],
+    faces: readonly number[],
+    isClosed = false,
+  ): Triple[][] {
+    const [first] = points;
+    const line = isClosed && first ? [...points, first] : points;
+    return this.plane?.lines(line, faces) ?? [line.map((point) => this.drawn(point))];
+  }
+
   /** Return the vertices of all edges, in pairs. */
   allEdges(): Promise<Uint32Array<ArrayBuffer>> {
     this.edges ??= this.worker.ask({ kind: "edges" }, "edges").then(({ edges }) => edges);
@@ -103,6 +127,7 @@ export class LoadedMesh {
 
   dispose(): void {
     this.geometry.dispose();
+    this.plane?.geometry.dispose();
     this.worker.end();
   }
 }

@@ -7,6 +7,9 @@ import type { LoadedMesh } from "./loader";
 /** What is no farther in front of a position, in radii of the mesh, does not hide it. */
 const CLOSE = 0.01;
 
+/** Whether a drawn position is beyond the section. */
+export type IsHidden = (position: Vector3) => boolean;
+
 export type FacePoint = Extract<Point, { face: number }>;
 
 /** Return the point of the surface under ``x``, ``y`` (-1 to 1, y upwards), or null where there is none. */
@@ -16,23 +19,35 @@ export function pick(
   camera: Camera,
   x: number,
   y: number,
+  isHidden: IsHidden,
 ): FacePoint | null {
   const origin = new Vector3().setFromMatrixPosition(camera.matrixWorld);
   const direction = new Vector3(x, y, 0.5).unproject(camera).sub(origin).normalize();
-  const hit = tree.raycastFirst(new Ray(origin, direction), DoubleSide);
+  const hit = firstHit(tree, new Ray(origin, direction), isHidden);
   if (hit?.faceIndex == null) return null;
-  const [a, b, c] = mesh
-    .corners(hit.faceIndex)
-    .map((v) => new Vector3(...mesh.drawn(mesh.vertex(v))));
+  const [a, b, c] = mesh.corners(hit.faceIndex).map((v) => new Vector3(...mesh.drawnVertex(v)));
   return { face: hit.faceIndex, barycentric: weights(a!, b!, c!, hit.point) };
 }
 
 /** Whether nothing of the surface is between the camera and a drawn position of it. */
-export function isSeen(tree: MeshBVH, camera: Camera, position: readonly number[]): boolean {
+export function isSeen(
+  tree: MeshBVH,
+  camera: Camera,
+  position: readonly number[],
+  isHidden: IsHidden,
+): boolean {
   const origin = new Vector3().setFromMatrixPosition(camera.matrixWorld);
   const way = new Vector3(...position).sub(origin);
-  const hit = tree.raycastFirst(new Ray(origin, way.clone().normalize()), DoubleSide);
+  const hit = firstHit(tree, new Ray(origin, way.clone().normalize()), isHidden);
   return hit === null || hit.distance > way.length() - CLOSE;
+}
+
+/** Return the first place on a ray where the surface is not hidden by a section, or null. */
+function firstHit(tree: MeshBVH, ray: Ray, isHidden: IsHidden) {
+  const first = tree.raycastFirst(ray, DoubleSide);
+  if (!first || !isHidden(first.point)) return first;
+  const seen = tree.raycast(ray, DoubleSide).filter(({ point }) => !isHidden(point));
+  return seen.sort((a, b) => a.distance - b.distance)[0] ?? null;
 }
 
 /** Return the barycentric weights of a point, none below 0, with sum 1. */
@@ -48,12 +63,25 @@ function weights(a: Vector3, b: Vector3, c: Vector3, point: Vector3): [number, n
 
 /** Return the position of a point, in mesh units. */
 export function positionOf(mesh: LoadedMesh, point: Point): [number, number, number] {
-  if ("vertex" in point) return mesh.vertex(point.vertex);
+  return between(mesh, point, (vertex) => mesh.vertex(vertex));
+}
+
+/** Return where a point is drawn. */
+export function drawnAt(mesh: LoadedMesh, point: Point): [number, number, number] {
+  return between(mesh, point, (vertex) => mesh.drawnVertex(vertex));
+}
+
+function between(
+  mesh: LoadedMesh,
+  point: Point,
+  place: (vertex: number) => [number, number, number],
+): [number, number, number] {
+  if ("vertex" in point) return place(point.vertex);
   const [vertices, shares] =
     "edge" in point
       ? [point.edge, [1 - point.t, point.t]]
       : [mesh.corners(point.face), point.barycentric];
-  const corners = vertices.map((vertex) => mesh.vertex(vertex));
+  const corners = vertices.map(place);
   return [0, 1, 2].map((axis) =>
     corners.reduce((sum, corner, i) => sum + shares[i]! * corner[axis]!, 0),
   ) as [number, number, number];

@@ -1,5 +1,7 @@
 // Fields and switches: they show the state and change it.
 import type { Effort, Method } from "geodesic-client";
+import { hasCost } from "../ask/costs";
+import { versusOf } from "../ask/fields";
 import { byId, query, written } from "../dom";
 import type { Up } from "../mesh/frame";
 import { service } from "../service";
@@ -12,6 +14,7 @@ import {
   type Lines,
   NO_QUESTION,
   type Palette,
+  RULES,
   type Shade,
   type State,
   type Store,
@@ -22,6 +25,13 @@ import type { Notes } from "./notes";
 
 /** Positions that are this many edges from the surface, at most, are on it: they were rounded. */
 const FAR = 0.1;
+
+/** Azimuth and polar angle of the usual views. */
+const LOOKS = [
+  ["front", 0, Math.PI / 2],
+  ["top", 0, 0.001],
+  ["iso", Math.PI / 4, Math.acos(1 / Math.sqrt(3))],
+] as const;
 
 type Question = Pick<WrittenState, "places" | "starts" | "walk" | "barriers" | "maxDistance">;
 
@@ -59,6 +69,18 @@ export class Controls {
     });
     byId("lines").addEventListener("change", () => this.readLines(true));
     byId("lines-value").addEventListener("change", () => this.readLines(false));
+    byId("boundary").addEventListener("change", () =>
+      store.update({ boundary: byId("boundary", HTMLInputElement).checked }),
+    );
+    byId("versus").addEventListener("change", () => {
+      const versus = byId("versus", HTMLSelectElement).value as Method;
+      store.update({ versus, shade: "difference" });
+    });
+    byId("slope").addEventListener("change", () => {
+      const rule = RULES.find((each) => each === byId("slope", HTMLSelectElement).value);
+      const up = sceneView.mesh?.frame.up ?? "z";
+      store.update({ slope: rule ? { rule, up } : null });
+    });
     byId("polar").addEventListener("change", () => {
       const polar = byId("polar", HTMLInputElement).checked;
       store.update({ polar, lines: store.state.lines ?? (polar ? INITIAL.lines : null) });
@@ -66,16 +88,42 @@ export class Controls {
     byId("palette").addEventListener("change", () =>
       store.update({ palette: byId("palette", HTMLSelectElement).value as Palette }),
     );
-    byId("range").addEventListener("change", () => {
-      const range = byId("range", HTMLInputElement).valueAsNumber;
-      store.update({ range: range > 0 ? range : null });
-    });
+    for (const end of ["least", "range"] as const) {
+      byId(end).addEventListener("change", () => {
+        const value = byId(end, HTMLInputElement).valueAsNumber;
+        store.update({ [end]: Number.isFinite(value) ? value : null });
+      });
+    }
     const unit = byId("unit", HTMLInputElement);
     unit.maxLength = LONGEST_UNIT;
     unit.addEventListener("change", () => store.update({ unit: unit.value.trim() }));
     byId("wireframe").addEventListener("change", () =>
       store.update({ wireframe: byId("wireframe", HTMLInputElement).checked }),
     );
+    byId("unroll").addEventListener("change", () =>
+      store.update({ unroll: byId("unroll", HTMLInputElement).checked, view: null, section: null }),
+    );
+    byId("flat").addEventListener("change", () =>
+      store.update({ flat: byId("flat", HTMLInputElement).checked }),
+    );
+    byId("label-lines").addEventListener("change", () =>
+      store.update({ labels: byId("label-lines", HTMLInputElement).checked }),
+    );
+    const [section, share] = [
+      byId("section", HTMLSelectElement),
+      byId("section-share", HTMLInputElement),
+    ];
+    const sectionNow = (): State["section"] => {
+      const axis = (["x", "y", "z"] as const).find((each) => each === section.value);
+      return axis ? { axis, share: share.valueAsNumber } : null;
+    };
+    section.addEventListener("change", () => store.update({ section: sectionNow() }));
+    share.addEventListener("input", () =>
+      sceneView.showLook({ ...store.state, section: sectionNow() }),
+    );
+    share.addEventListener("change", () => store.update({ section: sectionNow() }));
+    for (const [id, theta, phi] of LOOKS)
+      byId(`look-${id}`).addEventListener("click", () => sceneView.stage.lookFrom(theta, phi));
     byId("fit").addEventListener("click", () => {
       sceneView.stage.lookAtAll();
       store.replace({ view: null });
@@ -107,6 +155,15 @@ export class Controls {
     byId("epsilon").hidden = state.method !== "approximate";
     byId("efforts").hidden = state.method !== "fast";
     choose("shades", state.shade);
+    byId("shades").hidden = byId("more-method").hidden = hasCost(state);
+    byId("versus", HTMLSelectElement).value = versusOf(state);
+    for (const option of byId("versus", HTMLSelectElement).options)
+      option.disabled = option.value === state.method;
+    byId("slope", HTMLSelectElement).value = state.slope?.rule ?? "";
+    byId("cost-now").textContent = !hasCost(state)
+      ? "their length"
+      : [state.slope?.rule, state.tolls?.name].filter(Boolean).join(" × ");
+    byId("boundary", HTMLInputElement).checked = state.boundary;
     setValue("error-slider", String(Math.log10(state.error)));
     showError(state.error);
     byId("effort", HTMLSelectElement).value = String(state.effort);
@@ -121,8 +178,15 @@ export class Controls {
     byId("polar", HTMLInputElement).checked = state.polar;
     setValue("unit", state.unit);
     byId("palette", HTMLSelectElement).value = state.palette;
+    setValue("least", state.least === null ? "" : String(state.least));
     setValue("range", state.range === null ? "" : String(state.range));
     byId("wireframe", HTMLInputElement).checked = state.wireframe;
+    byId("flat", HTMLInputElement).checked = state.flat;
+    byId("unroll", HTMLInputElement).checked = state.unroll;
+    byId("label-lines", HTMLInputElement).checked = state.labels;
+    byId("section", HTMLSelectElement).value = state.section?.axis ?? "";
+    byId("section-share").hidden = state.section === null;
+    setValue("section-share", String(state.section?.share ?? 0.5));
   }
 
   /** Show the question; what cannot be read stays as it was typed. */

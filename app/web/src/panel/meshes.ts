@@ -2,6 +2,7 @@
 import type { About, ListedMesh, MeshDocument } from "geodesic-client";
 import { byId, count } from "../dom";
 import { InputError } from "../inputError";
+import { NUMBERS } from "../mesh/values";
 import { service } from "../service";
 import { type Store, withMesh } from "../state/state";
 import type { OnProgress, Status } from "../status";
@@ -32,6 +33,8 @@ export class Meshes {
   /** Files of this visit by the id of their mesh, to send again with its vertices joined. */
   private readonly files = new Map<string, File>();
   private formats = "";
+  /** Called with a file of numbers, while a mesh is open. */
+  onNumbers: (file: File) => void = () => undefined;
   private readonly select = byId("meshes", HTMLSelectElement);
   private readonly samples = document.createElement("optgroup");
 
@@ -44,7 +47,7 @@ export class Meshes {
     for (const id of ["pick", "welcome-pick"])
       byId(id).addEventListener("click", () => file.click());
     file.addEventListener("change", () => {
-      if (file.files?.[0]) this.upload(file.files[0]);
+      if (file.files?.[0]) this.take(file.files[0]);
       file.value = "";
     });
     this.select.addEventListener("change", () => {
@@ -154,8 +157,13 @@ export class Meshes {
       event.preventDefault();
       classList.remove("dropping");
       const file = event.dataTransfer?.files[0];
-      if (file) this.upload(file);
+      if (file) this.take(file);
     });
+  }
+
+  private take(file: File): void {
+    if (this.store.state.mesh !== null && NUMBERS.test(file.name)) this.onNumbers(file);
+    else this.upload(file);
   }
 }
 

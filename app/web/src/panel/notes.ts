@@ -2,7 +2,15 @@
 import type { MeshDocument } from "geodesic-client";
 import { byId } from "../dom";
 
-type Topic = "points" | "distances" | "isolines" | "borders" | "rays" | "path" | "walk";
+type Topic =
+  | "points"
+  | "distances"
+  | "isolines"
+  | "borders"
+  | "rays"
+  | "boundary"
+  | "path"
+  | "walk";
 
 export class Notes {
   private readonly told = new Map<Topic, readonly string[]>();

@@ -1,6 +1,6 @@
 // Mouse, fingers and keys on the mesh: a click sets a point, a drag moves it.
 import { Vector3 } from "three";
-import { type FacePoint, positionOf } from "../mesh/picking";
+import { drawnAt, type FacePoint, positionOf } from "../mesh/picking";
 import { type Act, actOf, nameOf, type Place, placedAt, type Tool } from "../state/places";
 import type { Point } from "../state/point";
 import { rounded } from "../state/point";
@@ -153,6 +153,7 @@ export class Pointer {
   private click(spot: Spot, modifiers: Modifiers): void {
     const point = this.at(spot);
     if (!point) {
+      if (spot instanceof PointerEvent && this.sceneView.stage.clickAxes(spot)) return;
       if (this.sceneView.isPickable) this.cue.tell("That is beside the mesh", spot);
       return;
     }
@@ -276,7 +277,7 @@ export class Pointer {
     let least = (this.device === "touch" ? REACH_OF_FINGERS : REACH).near;
     this.store.state.places.forEach(({ point }, i) => {
       if (!mesh.has(point)) return;
-      const drawn = mesh.drawn(positionOf(mesh, point));
+      const drawn = drawnAt(mesh, point);
       const [x, y] = stage.toPage(new Vector3(...drawn));
       const away = Math.hypot(x - spot.clientX, y - spot.clientY);
       if (away < least && this.sceneView.isSeen(drawn)) [nearest, least] = [i, away];

@@ -1,6 +1,7 @@
 // The current query as a curl command and as a Python program.
 
 import { type Question, toWire } from "geodesic-client";
+import { costOf } from "../ask/costs";
 import { questionOf } from "../ask/fields";
 import { endOf, stopsOf } from "../state/places";
 import type { Point } from "../state/point";
@@ -10,7 +11,9 @@ type Body = Record<string, unknown>;
 
 /** Return the question for the path from a source to a target. */
 export function pathOf(state: State, source: Point, target: Point): Question<"path"> {
-  return { source, target, waypoints: stopsOf(state), barriers: state.barriers };
+  const cost = costOf(state);
+  const question = { source, target, waypoints: stopsOf(state), barriers: state.barriers };
+  return cost ? { ...question, cost } : question;
 }
 
 /** Return the query that a state asks, by its end and its members in the service's names. */

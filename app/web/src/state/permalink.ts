@@ -4,7 +4,17 @@ import { InputError } from "../inputError";
 import type { Triple, Up } from "../mesh/frame";
 import type { Place } from "./places";
 import { parsePoint, type WrittenPoint, writePoint } from "./point";
-import { INITIAL, type Lines, PALETTES, type Palette, type Shade, type State } from "./state";
+import {
+  INITIAL,
+  type Lines,
+  PALETTES,
+  type Palette,
+  RULES,
+  type Section,
+  type Shade,
+  type Slope,
+  type State,
+} from "./state";
 
 /** Characters of the name of a unit, and of a point. */
 export const LONGEST_UNIT = 12;
@@ -16,6 +26,7 @@ const MOST_FACES = 1e8;
 /** A state whose points may still be positions, which the service has to locate. */
 export type WrittenState = Omit<State, "places"> & { places: readonly Place<WrittenPoint>[] };
 
+/** Return the address of a state, without the numbers of files. */
 export function writeState(state: State): string {
   const query = new URLSearchParams();
   if (state.mesh) query.set("mesh", state.mesh);
@@ -35,15 +46,23 @@ export function writeState(state: State): string {
   if (state.error !== INITIAL.error) query.set("error", String(state.error));
   if (state.effort !== INITIAL.effort) query.set("effort", String(state.effort));
   if (state.maxDistance !== null) query.set("max_distance", String(state.maxDistance));
+  if (state.slope) query.set("slope", `${state.slope.rule}:${state.slope.up}`);
   if (state.unit) query.set("unit", state.unit);
   if (!state.distances) query.set("distances", "0");
   if (state.shade !== INITIAL.shade) query.set("shade", state.shade);
+  if (state.versus) query.set("versus", state.versus);
   if (writeLines(state.lines) !== writeLines(INITIAL.lines))
     query.set("lines", writeLines(state.lines));
   if (state.polar) query.set("polar", "1");
+  if (state.boundary) query.set("boundary", "1");
   if (state.palette !== INITIAL.palette) query.set("palette", state.palette);
+  if (state.least !== null) query.set("least", String(state.least));
   if (state.range !== null) query.set("range", String(state.range));
+  if (state.labels) query.set("labels", "1");
   if (state.wireframe) query.set("wireframe", "1");
+  if (state.flat) query.set("flat", "1");
+  if (state.unroll) query.set("unroll", "1");
+  if (state.section) query.set("section", `${state.section.axis}:${state.section.share}`);
   if (state.up) query.set("up", state.up);
   if (state.view) query.set("view", state.view.map((x) => Number(x.toFixed(4))).join(","));
   // Points are easier to read without escapes, which none of these needs in a query.
@@ -62,6 +81,7 @@ export function readSample(search: string): [string, number] | null {
 }
 
 const UPS: readonly Up[] = ["y", "z"];
+const METHODS = ["exact", "approximate", "fast"] as const;
 
 export function readState(search: string): WrittenState {
   const query = new URLSearchParams(search);
@@ -77,19 +97,29 @@ export function readState(search: string): WrittenState {
     starts: Math.max(1, sources.length),
     walk: readWalk(query.get("walk") ?? ""),
     barriers: readRanges(query.get("barriers") ?? ""),
-    method: oneOf<Method>(query.get("method"), ["exact", "approximate", "fast"]),
+    method: oneOf<Method>(query.get("method"), METHODS),
     error: positive(query.get("error")) ?? INITIAL.error,
     effort: EFFORTS.find((effort) => String(effort) === query.get("effort")) ?? INITIAL.effort,
     maxDistance: positive(query.get("max_distance")),
+    slope: readSlope(query.get("slope")),
+    tolls: null,
+    values: null,
     isReadable: true,
     unit: query.get("unit")?.slice(0, LONGEST_UNIT) ?? "",
     distances: query.get("distances") !== "0",
     shade: oneOf<Shade>(query.get("shade"), ["distance", "territories", "difference", "proof"]),
+    versus: METHODS.find((method) => method === query.get("versus")) ?? null,
     lines: readLines(query.get("lines")),
     polar: query.get("polar") === "1",
+    boundary: query.get("boundary") === "1",
     palette: oneOf<Palette>(query.get("palette"), PALETTES),
-    range: positive(query.get("range")),
+    least: finite(query.get("least")),
+    range: finite(query.get("range")),
+    labels: query.get("labels") === "1",
     wireframe: query.get("wireframe") === "1",
+    flat: query.get("flat") === "1",
+    unroll: query.get("unroll") === "1",
+    section: readSection(query.get("section")),
     // A view without an axis was written when y was always up.
     up: UPS.find((up) => up === query.get("up")) ?? (view && "y"),
     view,
@@ -118,6 +148,19 @@ function readLines(text: string | null): Lines {
   if (number !== null && kind === "count") return { count: Math.round(number) };
   if (number !== null && kind === "spacing") return { spacing: number };
   return INITIAL.lines;
+}
+
+function readSlope(text: string | null): Slope | null {
+  const [name, axis] = text?.split(":") ?? [];
+  const rule = RULES.find((each) => each === name);
+  const up = UPS.find((each) => each === axis);
+  return rule && up ? { rule, up } : null;
+}
+
+function readSection(text: string | null): Section | null {
+  const [, axis, share] = /^([xyz]):([\d.]+)$/.exec(text ?? "") ?? [];
+  const isWithin = axis && Number(share) <= 1;
+  return isWithin ? { axis: axis as Section["axis"], share: Number(share) } : null;
 }
 
 /** Read a vector: x, y, z; nothing is none. */
@@ -168,6 +211,10 @@ function readRanges(text: string): number[] {
 
 function oneOf<T extends string>(text: string | null, choices: readonly [T, ...T[]]): T {
   return choices.find((choice) => choice === text) ?? choices[0];
+}
+
+function finite(text: string | null): number | null {
+  return text?.trim() && Number.isFinite(Number(text)) ? Number(text) : null;
 }
 
 function positive(text: string | null): number | null {

@@ -7,6 +7,25 @@ export type Shade = "distance" | "territories" | "difference" | "proof";
 export const PALETTES = ["teal", "viridis", "magma", "cividis", "turbo"] as const;
 export type Palette = (typeof PALETTES)[number];
 export type Lines = { count: number } | { spacing: number } | null;
+export const RULES = ["tobler", "naismith"] as const;
+/** What ways cost by their slope: a rule, and the axis of heights. */
+export interface Slope {
+  rule: (typeof RULES)[number];
+  up: Up;
+}
+/** Numbers of a file: one for each vertex, or for each face. NaN where there is none. */
+export interface Values {
+  name: string;
+  numbers: Float64Array;
+  /** A number of its own, which stands for the file in comparisons. */
+  key: number;
+}
+
+/** A plane that hides what is beyond: the axis that it is normal to, and the share of the extent. */
+export interface Section {
+  axis: "x" | "y" | "z";
+  share: number;
+}
 
 export interface State {
   mesh: string | null;
@@ -21,6 +40,11 @@ export interface State {
   error: number;
   effort: Effort;
   maxDistance: number | null;
+  /** What ways cost, by slope and by face; if anything, costs take the place of distances. */
+  slope: Slope | null;
+  tolls: Values | null;
+  /** Values of vertices, which take the place of distances. */
+  values: Values | null;
   /** Whether all fields of the question can be read; as long as one cannot, there is no question. */
   isReadable: boolean;
   /** The name of the unit of the mesh; empty: unknown. */
@@ -28,13 +52,25 @@ export interface State {
   /** Whether distances from the starts are computed and drawn. */
   distances: boolean;
   shade: Shade;
+  /** The method that the one of the question is compared with; null: the usual one. */
+  versus: Method | null;
   lines: Lines;
   /** Whether rays of the log map cross the isolines. */
   polar: boolean;
+  /** Whether the boundary of the surface is drawn. */
+  boundary: boolean;
   palette: Palette;
-  /** The distance of the last colour; null: the largest. */
+  /** The values of the first and the last colour; null: the least and the largest. */
+  least: number | null;
   range: number | null;
+  /** Whether isolines are labelled by their levels. */
+  labels: boolean;
   wireframe: boolean;
+  /** Whether colours are shown as they are, without light. */
+  flat: boolean;
+  section: Section | null;
+  /** Whether the surface is unrolled around the first start. */
+  unroll: boolean;
   /** The axis that points upwards; null: as guessed. */
   up: Up | null;
   /** Azimuth, polar angle, distance and target of the camera, as drawn; null: the whole mesh. */
@@ -51,15 +87,25 @@ export const INITIAL: State = {
   error: 0.01,
   effort: 2,
   maxDistance: null,
+  slope: null,
+  tolls: null,
+  values: null,
   isReadable: true,
   unit: "",
   distances: true,
   shade: "distance",
+  versus: null,
   lines: { count: 20 },
   polar: false,
+  boundary: false,
   palette: "teal",
+  least: null,
   range: null,
+  labels: false,
   wireframe: false,
+  flat: false,
+  section: null,
+  unroll: false,
   up: null,
   view: null,
 };
@@ -110,7 +156,9 @@ export class Store {
   /** Change the state by what is no step of the user's, or follows from one. */
   replace(change: Partial<State>): void {
     const before = this.current;
-    const asks = ["mesh", ...Object.keys(NO_QUESTION)].some((name) => name in change);
+    const asks = ["mesh", "slope", "tolls", ...Object.keys(NO_QUESTION)].some(
+      (name) => name in change,
+    );
     this.current = { ...before, isReadable: before.isReadable || asks, ...change };
     for (const listener of this.listeners) listener(this.current, before);
   }
@@ -162,7 +210,13 @@ export function withMesh(mesh: string, { lines }: State): Partial<State> {
     mesh,
     ...NO_QUESTION,
     unit: "",
+    slope: null,
+    tolls: null,
+    values: null,
+    least: null,
     range: null,
+    section: null,
+    unroll: false,
     lines: lines && "spacing" in lines ? INITIAL.lines : lines,
     up: null,
     view: null,

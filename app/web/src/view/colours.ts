@@ -64,6 +64,9 @@ const TERRITORIES: readonly Rgb[] = [
   [0.8, 0.475, 0.655],
 ];
 
+/** How many colours territories have. */
+export const HUES = TERRITORIES.length;
+
 export function territory(index: number): Rgb {
   return TERRITORIES[index % TERRITORIES.length]!;
 }

@@ -17,8 +17,8 @@ import { type Rgb, ramp } from "./colours";
 export interface Drawn {
   mesh: LoadedMesh;
   palette: Palette;
-  /** Values of the vertices, and the one at the end of the scale; null for a mesh without colours. */
-  field: { values: ArrayLike<number>; largest: number } | null;
+  /** Values of the vertices, and those at the ends of the scale; null for a mesh without colours. */
+  field: { values: ArrayLike<number>; least: number; largest: number } | null;
   lines: { name: string; points: readonly (readonly number[])[]; colour: Rgb }[];
 }
 
@@ -54,8 +54,8 @@ function coloursOf(mesh: LoadedMesh, palette: Palette, field: Drawn["field"]): F
   const clay = linear(CLAY);
   const found = new Float32Array(mesh.vertices.length);
   for (let v = 0; v < found.length / 3; v++) {
-    const share = field ? field.values[v]! / field.largest : Number.NaN;
-    const i = Math.round(Math.min(share, 1) * (colours.length - 1));
+    const share = field ? (field.values[v]! - field.least) / (field.largest - field.least) : NaN;
+    const i = Math.round(Math.min(Math.max(share, 0), 1) * (colours.length - 1));
     (share < Infinity ? colours[i]! : clay).toArray(found, 3 * v);
   }
   return found;

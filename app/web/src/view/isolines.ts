@@ -7,36 +7,41 @@ import { ribbonMesh, ribbons } from "./ribbon";
 import { LINES, type Stage } from "./scene";
 
 export class IsolineLayer {
-  private readonly object = ribbonMesh({
-    colour: 0xffffff,
-    casing: 0x1e293b,
-    inner: 1.2,
-    width: 2.6,
-    opacity: 1,
-    before: 0.001,
-    order: 1,
-  });
+  private readonly object: ReturnType<typeof ribbonMesh>;
 
-  constructor(private readonly stage: Stage) {
+  constructor(
+    private readonly stage: Stage,
+    colour = 0xffffff,
+    inner = 1.2,
+  ) {
+    this.object = ribbonMesh({
+      colour,
+      casing: 0x1e293b,
+      inner,
+      width: inner + 1.4,
+      opacity: 1,
+      before: 0.001,
+      order: 1,
+    });
     this.object.visible = false;
     this.object.layers.set(LINES);
     stage.add(this.object);
   }
 
   /** Show lines on a mesh, in place of the ones before. A closed line does not repeat its start. */
-  show(mesh: Pick<LoadedMesh, "drawn"> | null, lines: Pick<Isoline, "points" | "closed">[]): void {
+  show(
+    mesh: Pick<LoadedMesh, "drawnLines"> | null,
+    lines: Pick<Isoline, "points" | "closed" | "faces">[],
+  ): void {
     const isShown = mesh !== null && lines.length > 0;
     if (!isShown && !this.object.visible) return;
     this.object.visible = isShown;
     this.object.geometry.dispose();
     this.object.geometry = isShown
       ? ribbons(
-          lines.map((line) => {
-            const points = line.points ?? [];
-            return (line.closed ? [...points, points[0]!] : points).map((point) =>
-              mesh.drawn(point),
-            );
-          }),
+          lines.flatMap(({ points, faces, closed }) =>
+            mesh.drawnLines(points ?? [], faces, closed),
+          ),
         )
       : new BufferGeometry();
     this.stage.invalidate();

@@ -11,12 +11,15 @@ interface Label {
 
 export class Labels {
   private shown: { at: Vector3; element: HTMLElement }[] = [];
-  private readonly place = byId("labels");
+  private readonly place: HTMLElement;
 
   constructor(
     private readonly stage: Stage,
+    id: string,
     private readonly isSeen: (position: Triple) => boolean,
-  ) {}
+  ) {
+    this.place = byId(id);
+  }
 
   show(labels: Label[]): void {
     this.shown = labels.map(({ position, name }) => {

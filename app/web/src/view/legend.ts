@@ -1,7 +1,7 @@
 // The legend: the meaning of the colours.
 import { byId, written } from "../dom";
 import type { Palette } from "../state/state";
-import { css, ramp, territory } from "./colours";
+import { css, type Rgb, ramp } from "./colours";
 
 export function drawRamp(palette: Palette): void {
   const strip = byId("ramp", HTMLCanvasElement);
@@ -33,29 +33,40 @@ export function showProof(words: string | null): void {
   badge.textContent = words ?? "";
 }
 
-/** Show the scale from 0 to ``largest``. */
-export function showScale(title: string, largest: number): void {
+/** Show by how much two fields differ; null: nothing. */
+export function showDifference(words: string | null): void {
+  const line = byId("difference");
+  line.hidden = words === null;
+  line.textContent = words ?? "";
+}
+
+/** Show the scale from ``least`` to ``largest``. */
+export function showScale(title: string, largest: number, least = 0): void {
   byId("legend").hidden = false;
   byId("legend-title").textContent = title;
   byId("territories").replaceChildren();
   byId("scale").hidden = false;
   for (const [i, share] of [0, 0.5, 1].entries()) {
-    byId(`tick-${i}`).textContent = written(share * largest, 3);
+    byId(`tick-${i}`).textContent = written(least + share * (largest - least), 3);
   }
 }
 
-/** Show the colour of each source's territory. */
-export function showTerritories(sources: string[]): void {
+/** Show the colour of each territory, and its area where it is known. */
+export function showTerritories(
+  territories: { name: string; area: string; colour: Rgb }[],
+  unit: string,
+): void {
   byId("legend").hidden = false;
-  byId("legend-title").textContent = "Nearest start";
+  const isMeasured = territories.some(({ area }) => area);
+  byId("legend-title").textContent = isMeasured ? `Nearest start, area${unit}` : "Nearest start";
   byId("scale").hidden = true;
   byId("territories").replaceChildren(
-    ...sources.map((name, i) => {
+    ...territories.map(({ name, area, colour }) => {
       const row = document.createElement("li");
       const dot = document.createElement("span");
       dot.className = "dot";
-      dot.style.background = css(territory(i));
-      row.append(dot, name);
+      dot.style.background = css(colour);
+      row.append(dot, area ? `${name}: ${area}` : name);
       return row;
     }),
   );

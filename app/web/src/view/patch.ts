@@ -30,13 +30,13 @@ export class Patch {
     this.object.geometry.dispose();
     const count = mesh ? mesh.document.faces : 0;
     const corners = [...faces]
-      .filter((face) => face < count)
+      .filter((face) => face < count && mesh?.plane?.keeps(face) !== false)
       .flatMap((face) => mesh!.corners(face));
     const geometry = new BufferGeometry();
     if (mesh && corners.length > 0) {
-      geometry.setAttribute("position", mesh.geometry.getAttribute("position"));
+      geometry.setAttribute("position", mesh.shown.getAttribute("position"));
       geometry.setIndex(new BufferAttribute(Uint32Array.from(corners), 1));
-      geometry.boundingSphere = mesh.geometry.boundingSphere;
+      geometry.boundingSphere = mesh.shown.boundingSphere;
     }
     this.object.geometry = geometry;
     this.object.visible = corners.length > 0;

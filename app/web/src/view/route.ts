@@ -21,11 +21,11 @@ export class RouteLine {
     stage.addOverlay(this.object);
   }
 
-  /** Show a line through drawn positions; fewer than two hide it. */
-  show(points: Triple[]): void {
-    this.object.visible = points.length > 1;
+  /** Show lines through drawn positions; none hides it. */
+  show(lines: Triple[][]): void {
+    this.object.visible = lines.some((points) => points.length > 1);
     this.geometry.dispose();
-    this.geometry = ribbons([points]);
+    this.geometry = ribbons(lines);
     for (const line of this.object.children) (line as Mesh).geometry = this.geometry;
     this.stage.invalidateOverlay();
   }

@@ -13,6 +13,7 @@ import {
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { Backdrop } from "./backdrop";
+import { Compass } from "./compass";
 
 ColorManagement.enabled = false; // colours are given in sRGB, as displayed
 
@@ -36,6 +37,7 @@ export class Stage {
   readonly camera = new PerspectiveCamera(FIELD, 1, 0.01, 50);
   private readonly controls: OrbitControls;
   readonly renderer: WebGLRenderer;
+  readonly compass: Compass;
   /** Drawn positions of the mesh, three numbers each, which a view of the whole mesh shows. */
   shape: ArrayLike<number> = [];
   /** The direction from which it is seen first. */
@@ -55,6 +57,7 @@ export class Stage {
     this.renderer.autoClear = false;
     this.backdrop = new Backdrop(this.renderer);
     this.renderer.debug.checkShaderErrors = false; // asking would wait for the compiler
+    this.compass = new Compass(this.camera, canvas);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.zoomToCursor = true;
     this.controls.rotateSpeed = 0.9;
@@ -151,6 +154,21 @@ export class Stage {
     this.whole = direction;
   }
 
+  /** Show the whole mesh from an azimuth and a polar angle, and remember this. */
+  lookFrom(theta: number, phi: number): void {
+    const distance = MARGIN * this.distanceFrom(theta, phi);
+    this.look([theta, phi, distance, 0, 0, 0]);
+    this.moved();
+  }
+
+  /** Look along the axis that a click in the corner hits; return whether it hits one. */
+  clickAxes(event: PointerEvent): boolean {
+    if (!this.compass.click(event, this.controls.target)) return false;
+    this.look(this.view);
+    this.moved();
+    return true;
+  }
+
   /** Move the camera to a view. */
   look(view: number[]): void {
     this.whole = null;
@@ -244,6 +262,7 @@ export class Stage {
     else this.renderer.render(this.scene, this.camera);
     this.isStill = true;
     this.renderer.render(this.overlay, this.camera);
+    this.compass.draw(this.renderer);
   }
 
   private render(): void {

@@ -1,13 +1,24 @@
 // The mesh on the stage, with points, path, barriers and faults on it.
 
-import type { Border, Isoline, MeshDocument, PathAnswer } from "geodesic-client";
+import type {
+  Border,
+  Boundary,
+  Isoline,
+  IsolinesAnswer,
+  LogMap,
+  MeshDocument,
+  PathAnswer,
+  StraightLine,
+} from "geodesic-client";
 import { Mesh, PlaneGeometry, Vector3 } from "three";
-import type { MeshBVH } from "three-mesh-bvh";
+import { MeshBVH } from "three-mesh-bvh";
+import { written } from "../dom";
 import { frontOf, type Up } from "../mesh/frame";
 import { type LoadedMesh, loadMesh } from "../mesh/loader";
-import { type FacePoint, isSeen, pick, positionOf } from "../mesh/picking";
+import { drawnAt, type FacePoint, type IsHidden, isSeen, pick } from "../mesh/picking";
+import { Plane } from "../mesh/plane";
 import { nameOf } from "../state/places";
-import type { State } from "../state/state";
+import type { Section, State } from "../state/state";
 import { type Rgb, territory } from "./colours";
 import { IsolineLayer } from "./isolines";
 import { Labels } from "./labels";
@@ -25,6 +36,8 @@ const END: Rgb = [0.9, 0, 0.36];
 const STOP: Rgb = [0.96, 0.62, 0.04];
 const FAULT: Rgb = [0.85, 0.1, 0.1];
 const WALK: Rgb = [0.15, 0.39, 0.92];
+const SPOT: Rgb = [1, 0.8, 0.1];
+const BOUNDARY = 0xffa11f;
 const ROUTE_LINE = 0xe6005c;
 const WALK_LINE = 0x2563eb;
 
@@ -34,17 +47,24 @@ export class SceneView {
   readonly faults: Patch;
   mesh: LoadedMesh | null = null;
   surface: Surface | null = null;
+  /** The colour of each territory; one without is coloured by its number. */
+  hues: number[] = [];
   private readonly paint = surfacePaint();
   private tree: MeshBVH | null = null;
+  private isHidden: IsHidden = () => false;
   private readonly points: Markers;
   private readonly faultPoints: Markers;
   private readonly isolines: IsolineLayer;
   private readonly rays: IsolineLayer;
+  private readonly boundary: IsolineLayer;
+  private readonly spot: Markers;
   private readonly route: RouteLine;
   private readonly walk: RouteLine;
   private readonly walkEnd: Markers;
   private readonly territories: Territories;
   private readonly labels: Labels;
+  private readonly levels: Labels;
+  private shownLevels: IsolinesAnswer["isolines"] = [];
 
   constructor(readonly stage: Stage) {
     this.barriers = new Patch(stage, 0x15181f, 0.82);
@@ -52,17 +72,22 @@ export class SceneView {
     this.faults = new Patch(stage, 0xd9121f, 0.9);
     this.isolines = new IsolineLayer(stage);
     this.rays = new IsolineLayer(stage);
+    this.boundary = new IsolineLayer(stage, BOUNDARY, 2.6);
     this.route = new RouteLine(stage, ROUTE_LINE);
     this.walk = new RouteLine(stage, WALK_LINE);
     this.walkEnd = new Markers(stage);
     this.territories = new Territories(stage, this.paint);
     this.points = new Markers(stage);
     this.faultPoints = new Markers(stage);
+    this.spot = new Markers(stage);
     this.warmUp();
-    this.labels = new Labels(stage, (position) => this.isSeen(position));
+    const isSeenNow = (position: Triple): boolean => this.isSeen(position);
+    this.labels = new Labels(stage, "point-labels", isSeenNow);
+    this.levels = new Labels(stage, "level-labels", isSeenNow);
     stage.onFrame = () => {
-      showScaleBar(stage, this.mesh?.frame.radius ?? null);
+      showScaleBar(stage, (this.mesh?.plane ?? this.mesh?.frame)?.radius ?? null);
       this.labels.follow();
+      this.levels.follow();
     };
   }
 
@@ -75,9 +100,23 @@ export class SceneView {
     const { array: normals } = mesh.geometry.getAttribute("normal");
     this.stage.shape = positions;
     this.stage.front.set(...frontOf(positions, normals));
+    this.stage.compass.isShown = true;
+    this.stage.compass.name(mesh.frame.up);
     this.stage.add(this.surface.object);
     await this.stage.drawn();
     this.tree = await mesh.tree;
+  }
+
+  /** Unroll the surface into the plane of a log map. */
+  unroll(logMap: LogMap): void {
+    const { mesh, surface } = this;
+    if (!mesh || !surface) return;
+    mesh.plane = new Plane(mesh, logMap);
+    surface.reshape();
+    this.tree = new MeshBVH(mesh.shown, { indirect: true });
+    this.stage.shape = mesh.shown.getAttribute("position").array;
+    this.stage.front.set(0, 0, 1);
+    this.stage.compass.isShown = false;
   }
 
   /** Draw everything once without extent, so that later nothing waits for its shader. */
@@ -87,8 +126,10 @@ export class SceneView {
       [0, 0, 0],
     ];
     this.points.show([{ position: [0, 0, 0], fill: START, size: 0 }]);
-    this.isolines.show({ drawn: () => [0, 0, 0] }, [{ points: nowhere, closed: false }]);
-    this.route.show(nowhere);
+    this.isolines.show({ drawnLines: () => [nowhere] }, [
+      { points: nowhere, closed: false, faces: [] },
+    ]);
+    this.route.show([nowhere]);
     this.stage.warmUp(new Mesh(new PlaneGeometry(0, 0), this.paint));
     this.points.show([]);
     this.isolines.show(null, []);
@@ -104,11 +145,16 @@ export class SceneView {
     for (const patch of [this.barriers, this.region, this.faults]) patch.show(null, []);
     this.points.show([]);
     this.labels.show([]);
+    this.shownLevels = [];
+    this.levels.show([]);
+    this.stage.compass.isShown = false;
     this.faultPoints.show([]);
     this.isolines.show(null, []);
     this.rays.show(null, []);
+    this.boundary.show(null, []);
+    this.showSpot(null);
     this.route.show([]);
-    this.showWalk([]);
+    this.showWalk(null);
     this.showBorders(new Int32Array(), []);
   }
 
@@ -118,19 +164,31 @@ export class SceneView {
 
   /** Return the point of the surface under a place of the canvas, or null where there is none. */
   pick(x: number, y: number): FacePoint | null {
-    return this.mesh && this.tree ? pick(this.mesh, this.tree, this.stage.camera, x, y) : null;
+    const { mesh, tree } = this;
+    return mesh && tree ? pick(mesh, tree, this.stage.camera, x, y, this.isHidden) : null;
   }
 
   /** Whether a drawn position of the surface is not hidden by it. */
   isSeen(position: Triple): boolean {
-    return !this.tree || isSeen(this.tree, this.stage.camera, position);
+    return !this.tree || isSeen(this.tree, this.stage.camera, position, this.isHidden);
+  }
+
+  /** Show the surface in a light or flat, and only what a section leaves of it. */
+  showLook({ flat, section }: Pick<State, "flat" | "section">): void {
+    const { mesh, surface } = this;
+    if (!mesh || !surface) return;
+    surface.setLit(!flat);
+    const [normal, out] = section ? planeOf(mesh, section) : [new Vector3(), 1];
+    surface.setSection(normal.toArray(), out);
+    this.isHidden = section ? (position) => normal.dot(position) > out : () => false;
+    this.stage.invalidate();
   }
 
   /** Show the whole mesh, from where the points can be seen if there are any. */
   lookAtAll({ places }: State): void {
     const mesh = this.mesh;
     const points = places.map(({ point }) => point).filter((point) => mesh?.has(point));
-    if (!mesh || points.length === 0) {
+    if (!mesh || mesh.plane || points.length === 0) {
       this.stage.lookAtAll();
       return;
     }
@@ -156,8 +214,8 @@ export class SceneView {
     const shown = places.flatMap(({ point }, i) => {
       if (!mesh?.has(point) || !isReadable) return [];
       const isStop = i >= starts && i < places.length - 1;
-      const fill = i < starts ? (hasTerritories ? territory(i) : START) : isStop ? STOP : END;
-      const position = mesh.drawn(positionOf(mesh, point));
+      const fill = i < starts ? (hasTerritories ? this.colourOf(i) : START) : isStop ? STOP : END;
+      const position = drawnAt(mesh, point);
       return { position, fill, size: isStop ? 14 : 17, name: nameOf(state, i) };
     });
     this.points.show(shown);
@@ -169,31 +227,69 @@ export class SceneView {
   }
 
   showRoute(outline: PathAnswer | null): void {
-    const points = this.mesh ? (outline?.points ?? []) : [];
-    this.route.show(points.map((point) => this.mesh!.drawn(point)));
+    const { points, faces } = outline ?? {};
+    this.route.show((this.mesh && points && this.mesh.drawnLines(points, faces ?? [])) || []);
   }
 
   /** Show a straight line, and a point at its end. */
-  showWalk(points: readonly Triple[]): void {
-    const drawn = this.mesh ? points.map((point) => this.mesh!.drawn(point)) : [];
+  showWalk(line: Pick<StraightLine, "points" | "faces"> | null): void {
+    const drawn =
+      (this.mesh && line?.points && this.mesh.drawnLines(line.points, line.faces)) || [];
     this.walk.show(drawn);
-    this.walkEnd.show(drawn.slice(-1).map((position) => ({ position, fill: WALK, size: 13 })));
+    const end = drawn.at(-1)?.slice(-1) ?? [];
+    this.walkEnd.show(end.map((position) => ({ position, fill: WALK, size: 13 })));
   }
 
-  showRays(rays: Pick<Isoline, "points">[]): void {
+  showRays(rays: Pick<Isoline, "points" | "faces">[]): void {
     this.rays.show(
       this.mesh,
-      rays.map(({ points }) => ({ points, closed: false })),
+      rays.map((ray) => ({ ...ray, closed: false })),
     );
   }
 
-  showIsolines(lines: Isoline[]): void {
-    this.isolines.show(this.mesh, lines);
+  showBoundary(lines: Boundary[]): void {
+    this.boundary.show(this.mesh, lines);
+  }
+
+  /** Mark a position on the path; null: none. */
+  showSpot(position: Triple | null): void {
+    const { mesh } = this;
+    this.spot.show(
+      mesh && position && !mesh.plane
+        ? [{ position: mesh.drawn(position), fill: SPOT, size: 15 }]
+        : [],
+    );
+  }
+
+  /** Label each level in the middle of its longest line, or none. */
+  showLevels({ labels }: Pick<State, "labels">): void {
+    const { mesh } = this;
+    const shown = this.shownLevels.flatMap(({ level, lines }) => {
+      const [longest] = lines.toSorted((a, b) => b.length - a.length);
+      const [drawn = []] = mesh?.drawnLines(longest?.points ?? [], longest?.faces ?? []) ?? [];
+      const position = drawn[Math.floor(drawn.length / 2)];
+      return position ? { position, name: written(level, 3) } : [];
+    });
+    this.levels.show(labels ? shown : []);
+    this.stage.invalidateOverlay();
+  }
+
+  /** Return the colour of the territory of a source. */
+  colourOf(source: number): Rgb {
+    return territory(this.hues[source] ?? source);
+  }
+
+  showIsolines(levels: IsolinesAnswer["isolines"]): void {
+    this.shownLevels = levels;
+    this.isolines.show(
+      this.mesh,
+      levels.flatMap(({ lines }) => lines),
+    );
   }
 
   /** Show the borders of territories; ``nearest`` is the nearest source of each vertex. */
   showBorders(nearest: Int32Array, borders: Border[]): void {
-    this.territories.show(this.mesh, nearest, borders);
+    this.territories.show(this.mesh, nearest, borders, (source) => this.colourOf(source));
   }
 
   showFaults(faces: number[], points: [number, number, number][]): void {
@@ -205,4 +301,18 @@ export class SceneView {
     }));
     this.faultPoints.show(marks);
   }
+}
+
+/** Return the normal of a section in drawn positions, and how far out it is. */
+function planeOf(mesh: LoadedMesh, { axis, share }: Section): [Vector3, number] {
+  const [low, high] = mesh.document.bounds ?? [
+    [0, 0, 0],
+    [0, 0, 0],
+  ];
+  const at = "xyz".indexOf(axis);
+  const ends = [low, high].map((corner) => new Vector3(...mesh.drawn(corner)));
+  const [from = new Vector3(), to = new Vector3()] = ends;
+  const along = low.map((x, i) => (i === at ? (high[i] ?? x) : x));
+  const normal = new Vector3(...mesh.drawn(along)).sub(from).normalize();
+  return [normal, from.dot(normal) + share * to.sub(from).dot(normal)];
 }

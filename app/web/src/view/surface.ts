@@ -11,7 +11,9 @@ import {
   Mesh,
   RGBAFormat,
   ShaderMaterial,
+  Vector4,
 } from "three";
+import type { Triple } from "../mesh/frame";
 import type { LoadedMesh } from "../mesh/loader";
 import { INITIAL, type Palette } from "../state/state";
 import { type Rgb, ramp, territory } from "./colours";
@@ -23,7 +25,9 @@ const VERTEX = /* glsl */ `
   varying vec3 v_tint;
   varying vec3 v_normal;
   varying vec3 v_eye;
+  varying vec3 v_place;
   void main() {
+    v_place = position;
     v_value = value;
     v_tint = tint;
     v_normal = normalMatrix * normal;
@@ -32,20 +36,25 @@ const VERTEX = /* glsl */ `
     gl_Position = projectionMatrix * eye;
   }`;
 
-// A value below 0 means unreached: one such vertex turns its whole face grey.
+// Values are shares of the range of colours; far below it means unreached: one such vertex turns its
+// whole face grey.
 const FRAGMENT = /* glsl */ `
+  const float UNREACHED = -1e3;
   uniform sampler2D ramp;
-  uniform float largest;
   uniform float tinted;
   uniform vec3 clay;
   varying float v_value;
   varying vec3 v_tint;
   varying vec3 v_normal;
   varying vec3 v_eye;
+  varying vec3 v_place;
+  uniform vec4 section;
+  uniform float lit;
   void main() {
+    if (dot(v_place, section.xyz) > section.w) discard;
     vec3 colour = clay;
-    if (v_value >= 0.0) {
-      float share = clamp(v_value / largest, 0.0, 1.0);
+    if (v_value > UNREACHED) {
+      float share = clamp(v_value, 0.0, 1.0);
       colour = texture2D(ramp, vec2(share * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb;
       colour = mix(colour, v_tint * (1.06 - 0.36 * share), tinted);
     }
@@ -56,8 +65,8 @@ const FRAGMENT = /* glsl */ `
     float sky = 0.5 + 0.5 * normal.y;
     float gloss = pow(max(dot(normal, normalize(eye + vec3(0.35, 0.6, 0.9))), 0.0), 48.0);
     float edge = pow(1.0 - max(dot(normal, eye), 0.0), 4.0);
-    colour *= 0.50 + 0.14 * sky + 0.44 * key;
-    colour += 0.10 * gloss + 0.06 * edge;
+    colour *= mix(1.0, 0.50 + 0.14 * sky + 0.44 * key, lit);
+    colour += lit * (0.10 * gloss + 0.06 * edge);
     gl_FragColor = vec4(colour, 1.0);
   }`;
 
@@ -71,9 +80,10 @@ export function surfacePaint(): ShaderMaterial {
   return new ShaderMaterial({
     uniforms: {
       ramp: { value: rampTexture(INITIAL.palette) },
-      largest: { value: 1 },
       tinted: { value: 0 },
       clay: { value: CLAY },
+      lit: { value: 1 },
+      section: { value: new Vector4(0, 0, 0, 1) },
     },
     vertexShader: VERTEX,
     fragmentShader: FRAGMENT,
@@ -107,7 +117,7 @@ export class Surface {
     private readonly paint: ShaderMaterial,
   ) {
     const count = mesh.geometry.getAttribute("position").count;
-    this.values = new BufferAttribute(new Float32Array(count).fill(-1), 1);
+    this.values = new BufferAttribute(new Float32Array(count), 1);
     this.tints = new BufferAttribute(new Float32Array(3 * count), 3);
     mesh.geometry.setAttribute("value", this.values);
     mesh.geometry.setAttribute("tint", this.tints);
@@ -118,14 +128,14 @@ export class Surface {
   }
 
   /** Colour by values at vertices; vertices without a finite value are grey, with null all are. */
-  setValues(values: ArrayLike<number> | null, largest: number): void {
+  setValues(values: ArrayLike<number> | null, largest: number, least = 0): void {
     const array = this.values.array;
+    const extent = largest - least || 1;
     for (let i = 0; i < array.length; i++) {
-      const value = values ? values[i]! : -1;
-      array[i] = value >= 0 && value < Infinity ? value : -1e9;
+      const share = values ? (values[i]! - least) / extent : Number.NaN;
+      array[i] = Number.isFinite(share) ? Math.min(Math.max(share, -100), 100) : -1e9;
     }
     this.values.needsUpdate = true;
-    this.uniform("largest").value = largest || 1;
   }
 
   /** Light the vertices that have a finite value, and dim all others, until territories are set. */
@@ -149,6 +159,24 @@ export class Surface {
     this.tints.needsUpdate = true;
   }
 
+  /** Show colours in a light, or as they are. */
+  setLit(isLit: boolean): void {
+    this.uniform("lit").value = isLit ? 1 : 0;
+  }
+
+  /** Hide what is beyond a plane of drawn positions, given by its normal and how far it is out. */
+  setSection([x, y, z]: Triple, out: number): void {
+    (this.uniform("section").value as Vector4).set(x, y, z, out);
+  }
+
+  /** Draw what the mesh shows now: the surface, or its plane. */
+  reshape(): void {
+    const { shown } = this.mesh;
+    shown.setAttribute("value", this.values);
+    shown.setAttribute("tint", this.tints);
+    this.object.geometry = shown;
+  }
+
   setPalette(palette: Palette): void {
     const uniform = this.uniform("ramp");
     (uniform.value as DataTexture).dispose();
@@ -156,7 +184,7 @@ export class Surface {
   }
 
   async setWireframe(isVisible: boolean, colour: Rgb): Promise<void> {
-    if (isVisible && !this.wires) {
+    if (isVisible && !this.wires && !this.mesh.plane) {
       const edges = await this.mesh.allEdges();
       if (this.wires) return;
       const geometry = new BufferGeometry();

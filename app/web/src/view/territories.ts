@@ -4,7 +4,8 @@ import type { Border } from "geodesic-client";
 import { BufferAttribute, BufferGeometry, Mesh, type ShaderMaterial } from "three";
 import { divide, type Piece } from "../mesh/division";
 import type { LoadedMesh } from "../mesh/loader";
-import { territory } from "./colours";
+import { placeIn } from "../mesh/plane";
+import type { Rgb } from "./colours";
 import { IsolineLayer } from "./isolines";
 import { LINES, type Stage } from "./scene";
 import { inFront } from "./surface";
@@ -25,18 +26,28 @@ export class Territories {
   }
 
   /** Show borders on a mesh that is coloured by ``nearest``, the nearest source of each vertex. */
-  show(mesh: LoadedMesh | null, nearest: Int32Array, borders: Border[]): void {
+  show(
+    mesh: LoadedMesh | null,
+    nearest: Int32Array,
+    borders: Border[],
+    colourOf: (source: number) => Rgb,
+  ): void {
     this.lines.show(mesh, borders);
     this.object.geometry.dispose();
-    this.object.geometry = mesh ? divided(mesh, nearest, borders) : new BufferGeometry();
+    this.object.geometry = mesh ? divided(mesh, nearest, borders, colourOf) : new BufferGeometry();
     this.object.visible = mesh !== null && borders.length > 0;
     this.stage.invalidate();
   }
 }
 
 /** Return the faces that borders cross, in parts of one colour each. */
-function divided(mesh: LoadedMesh, nearest: Int32Array, borders: Border[]): BufferGeometry {
-  const whole = mesh.geometry;
+function divided(
+  mesh: LoadedMesh,
+  nearest: Int32Array,
+  borders: Border[],
+  colourOf: (source: number) => Rgb,
+): BufferGeometry {
+  const whole = mesh.shown;
   const [positions, normals, values] = ["position", "normal", "value"].map((name) =>
     whole.getAttribute(name),
   );
@@ -49,7 +60,7 @@ function divided(mesh: LoadedMesh, nearest: Int32Array, borders: Border[]): Buff
   for (const [face, pieces] of piecesByFace(mesh, borders)) {
     const corners = mesh.corners(face);
     const sources = corners.map((corner) => nearest[corner]!);
-    if (sources.some((source) => source < 0)) continue;
+    if (sources.some((source) => source < 0) || mesh.plane?.keeps(face) === false) continue;
     for (const { places, source } of divide(sources, pieces)) {
       for (const [v, w] of places) {
         const weights = [1 - v - w, v, w];
@@ -62,7 +73,7 @@ function divided(mesh: LoadedMesh, nearest: Int32Array, borders: Border[]): Buff
         drawn.position.push(at(positions, 0), at(positions, 1), at(positions, 2));
         drawn.normal.push(at(normals, 0), at(normals, 1), at(normals, 2));
         drawn.value.push(at(values, 0));
-        drawn.tint.push(...territory(source));
+        drawn.tint.push(...colourOf(source));
       }
     }
   }
@@ -93,16 +104,4 @@ function piecesByFace(mesh: LoadedMesh, borders: Border[]): Map<number, Piece[]>
     });
   }
   return found;
-}
-
-/** Return the weights of the second and third corner of a face at a position in it. */
-function placeIn(mesh: LoadedMesh, face: number, position: readonly number[]): [number, number] {
-  const [a, b, c] = mesh.corners(face).map((corner) => mesh.vertex(corner));
-  const [p, q, r] = [b!, c!, position].map((end) => end.map((x, axis) => x - a![axis]!));
-  const dot = (x: number[], y: number[]): number =>
-    x.reduce((sum, value, axis) => sum + value * y[axis]!, 0);
-  const [pp, pq, qq, rp, rq] = [dot(p!, p!), dot(p!, q!), dot(q!, q!), dot(r!, p!), dot(r!, q!)];
-  const spread = pp * qq - pq * pq;
-  if (!(spread > 0)) return [0, 0];
-  return [(qq * rp - pq * rq) / spread, (pp * rq - pq * rp) / spread];
 }
