@@ -1,4 +1,4 @@
-"""What generators make of the interface document: a client that computes a path, and types."""
+"""Generators make a client of the interface document, which computes a path, and types."""
 
 import subprocess
 import sys
