@@ -146,7 +146,6 @@ def test_a_path_along_the_boundary_may_stray_by_rounding():
         check_path(mesh, field.path_to(target), 146, target, field.distances[target])
 
 
-@pytest.mark.jit
 def test_a_path_between_many_sheets_around_a_tip_is_found():
     """Its line may go through sheets in tens of thousands of ways: each place is tried once."""
     rng = np.random.default_rng(114)

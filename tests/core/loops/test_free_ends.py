@@ -11,8 +11,6 @@ from tests.support import zoo
 from tests.support.meshes import mesh_of
 from tests.support.straightness import worst_bend
 
-pytestmark = pytest.mark.jit
-
 
 def waisted(random, columns=9, rows=5):
     """A strip in the plane with a waist, and both rims; columns of vertices, from below."""
@@ -43,6 +41,7 @@ def test_a_curve_across_a_strip_moves_to_its_waist(seed):
         assert rim.distance(shapely.Point(point[:2])) < 1e-12
 
 
+@pytest.mark.jit
 def test_the_shortest_of_all_is_the_least_distance_of_two_boundaries():
     mesh = gc.samples.obstacles(3000)
     outer, hole = mesh.boundaries()[:2]
