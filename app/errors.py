@@ -17,6 +17,8 @@ class Code:
     status: int
     title: str
     meaning: str
+    chapter: str
+    """Of the documents, which tells more, as ``geodesic docs`` takes it"""
     other_statuses: Sequence[int] = ()
     """Further statuses; ``meaning`` says when"""
 
@@ -28,175 +30,203 @@ class Code:
 
 CODES: Mapping[str, Code] = {
     "malformed_body": Code(
-        400, "Malformed body", "The body is not valid for its media type, for example broken JSON."
+        400,
+        "Malformed body",
+        "The body is not valid for its media type, for example broken JSON.",
+        "http",
     ),
     "idempotency_key_unused": Code(
         400,
         "Idempotency key unused",
         "`Idempotency-Key` names a job, and this request makes none; send it together with "
         "`Prefer: respond-async`, or leave it out.",
+        "http#jobs",
     ),
     "malformed_request": Code(
-        400, "Malformed request", "The bytes received are not a valid HTTP request."
+        400,
+        "Malformed request",
+        "The bytes received are not a valid HTTP request.",
+        "operations#access",
     ),
-    "unauthorized": Code(401, "Unauthorized", "The request has no API key, or a wrong one."),
+    "unauthorized": Code(
+        401, "Unauthorized", "The request has no API key, or a wrong one.", "operations#access"
+    ),
     "origin_not_allowed": Code(
-        403, "Origin not allowed", "Pages of other sites may not make changes here; see `hint`."
+        403,
+        "Origin not allowed",
+        "Pages of other sites may not make changes here; see `hint`.",
+        "operations#access",
     ),
-    "not_found": Code(404, "Not found", "There is nothing at this address."),
-    "mesh_not_found": Code(404, "Mesh not found", "No mesh with this id is in the store."),
-    "job_not_found": Code(404, "Job not found", "No job with this id is known."),
+    "not_found": Code(404, "Not found", "There is nothing at this address.", "http"),
+    "mesh_not_found": Code(
+        404, "Mesh not found", "No mesh with this id is in the store.", "operations#the-store"
+    ),
+    "job_not_found": Code(404, "Job not found", "No job with this id is known.", "http#jobs"),
     "method_not_allowed": Code(
-        405, "Method not allowed", "The address does not support this HTTP method; see `Allow`."
+        405,
+        "Method not allowed",
+        "The address does not support this HTTP method; see `Allow`.",
+        "http",
     ),
     "not_acceptable": Code(
-        406, "Not acceptable", "The answer is not available in any of the accepted formats."
+        406,
+        "Not acceptable",
+        "The answer is not available in any of the accepted formats.",
+        "http#formats",
     ),
-    "job_not_finished": Code(409, "Job not finished", "The job has no result yet; try again."),
-    "job_dismissed": Code(410, "Job dismissed", "The job was cancelled and has no result."),
+    "job_not_finished": Code(
+        409, "Job not finished", "The job has no result yet; try again.", "http#jobs"
+    ),
+    "job_dismissed": Code(
+        410, "Job dismissed", "The job was cancelled and has no result.", "http#jobs"
+    ),
     "upload_too_large": Code(
-        413, "Body too large", "The body of the request is larger than the service accepts."
+        413,
+        "Body too large",
+        "The body of the request is larger than the service accepts.",
+        "operations#settings",
     ),
     "result_too_large": Code(
-        413, "Result too large", "The answer is too large for this format; see `hint`."
+        413,
+        "Result too large",
+        "The answer is too large for this format; see `hint`.",
+        "http#formats",
     ),
     "unsupported_media_type": Code(
-        415, "Unsupported media type", "The service cannot read the format of the body."
+        415,
+        "Unsupported media type",
+        "The service cannot read the format of the body.",
+        "reference/files",
     ),
     "range_not_satisfiable": Code(
-        416, "Range not satisfiable", "The requested range lies outside the content."
+        416,
+        "Range not satisfiable",
+        "The requested range lies outside the content.",
+        "matrices#on-a-service-and-on-several-machines",
     ),
     "host_not_allowed": Code(
         421,
         "Host not allowed",
         "The service does not accept requests for this host name; see `hint`.",
+        "operations#access",
     ),
     "invalid_request": Code(
-        422, "Invalid request", "A field is missing, unknown, or outside its domain; see `errors`."
+        422,
+        "Invalid request",
+        "A field is missing, unknown, or outside its domain; see `errors`.",
+        "http",
     ),
     "invalid_mesh": Code(
-        422, "Invalid mesh", "The mesh cannot be used; `errors` names the faulty elements."
+        422,
+        "Invalid mesh",
+        "The mesh cannot be used; `errors` names the faulty elements.",
+        "accuracy#imperfect-meshes",
     ),
-    "invalid_point": Code(422, "Invalid point", "A source or target is not a point of the mesh."),
+    "invalid_point": Code(
+        422, "Invalid point", "A source or target is not a point of the mesh.", "http#points"
+    ),
     "not_embedded": Code(
         422,
         "Not embedded",
         "The mesh is given by the lengths of its edges, and the query needs positions in space: "
         "upload it with vertices, or ask for angles in place of vectors.",
+        "http#surfaces-by-lengths",
     ),
     "limit_exceeded": Code(
         422,
         "Limit exceeded",
         "The request exceeds a limit of this service; see `setting` or `hint`.",
+        "operations#settings",
     ),
     "memory_limit": Code(
-        422, "Memory limit", "The query needs more memory than the service grants to one query."
+        422,
+        "Memory limit",
+        "The query needs more memory than the service grants to one query.",
+        "operations#workers",
     ),
-    "rate_limited": Code(429, "Rate limited", "Too many requests; see `Retry-After`."),
+    "rate_limited": Code(
+        429, "Rate limited", "Too many requests; see `Retry-After`.", "operations#access"
+    ),
     "quota_exceeded": Code(
         429,
         "Quota exceeded",
         "The caller has reached the quota that `setting` names. The status is 429 for jobs and for "
         "uploads under way (see `Retry-After`), and 507 for stored meshes and for answers to jobs "
         "(see `hint`).",
+        "operations#access",
         other_statuses=(507,),
     ),
     "header_too_large": Code(
-        431, "Header too large", "The request line and the headers are too large."
+        431,
+        "Header too large",
+        "The request line and the headers are too large.",
+        "operations#access",
     ),
     "internal_error": Code(
-        500, "Internal error", "A defect of the service; please report it with the request id."
+        500,
+        "Internal error",
+        "A defect of the service; please report it with the request id.",
+        "operations#log",
     ),
     "worker_died": Code(
-        500, "Worker died", "The process that computed the answer died; it has been replaced."
+        500,
+        "Worker died",
+        "The process that computed the answer died; it has been replaced.",
+        "operations#faults",
     ),
     "mesh_damaged": Code(
         500,
         "Mesh damaged",
         "The stored files of this mesh are damaged; upload the mesh again.",
+        "operations#the-store",
     ),
     "queue_full": Code(
         503,
         "Queue full",
         "Too many requests wait for a worker, or too many uploads are under way; see "
         "`Retry-After`.",
+        "operations#workers",
     ),
     "too_many_connections": Code(
-        503, "Too many connections", "The service has too many open connections; try again."
+        503,
+        "Too many connections",
+        "The service has too many open connections; try again.",
+        "operations#access",
     ),
     "engine_unavailable": Code(
-        503, "Engine unavailable", "No worker process can be started at the moment."
+        503,
+        "Engine unavailable",
+        "No worker process can be started at the moment.",
+        "operations#faults",
     ),
     "state_unavailable": Code(
         503,
         "State unavailable",
         "The database of jobs and quotas does not answer; see `Retry-After`. The request may or "
         "may not have made its change: repeat it with the same `Idempotency-Key`.",
+        "operations#faults",
     ),
     "store_unavailable": Code(
         503,
         "Store unavailable",
         "The object store of meshes and answers does not answer; see `Retry-After`. It is safe to "
         "repeat an upload: its mesh is stored once.",
-    ),
-    "draining": Code(503, "Draining", "The service is shutting down."),
-    "deadline_exceeded": Code(
-        504, "Deadline exceeded", "The answer was not ready within the time limit."
-    ),
-    "storage_full": Code(
-        507, "Storage full", "The store has no room left, or its disk is read-only."
-    ),
-}
-
-CHAPTERS: Mapping[str, str] = {
-    "idempotency_key_unused": "http#jobs",
-    "internal_error": "operations#log",
-    "invalid_mesh": "accuracy#imperfect-meshes",
-    "invalid_point": "http#points",
-    "invalid_request": "http",
-    "job_dismissed": "http#jobs",
-    "job_not_finished": "http#jobs",
-    "job_not_found": "http#jobs",
-    "limit_exceeded": "operations#settings",
-    "malformed_body": "http",
-    "mesh_damaged": "operations#the-store",
-    "mesh_not_found": "operations#the-store",
-    "method_not_allowed": "http",
-    "not_acceptable": "http#formats",
-    "not_embedded": "http#surfaces-by-lengths",
-    "not_found": "http",
-    "range_not_satisfiable": "matrices#on-a-service-and-on-several-machines",
-    "result_too_large": "http#formats",
-    "storage_full": "operations#the-store",
-    "unsupported_media_type": "reference/files",
-    "upload_too_large": "operations#settings",
-    **dict.fromkeys(
-        (
-            "header_too_large",
-            "host_not_allowed",
-            "malformed_request",
-            "origin_not_allowed",
-            "quota_exceeded",
-            "rate_limited",
-            "too_many_connections",
-            "unauthorized",
-        ),
-        "operations#access",
-    ),
-    **dict.fromkeys(("memory_limit", "queue_full"), "operations#workers"),
-    **dict.fromkeys(
-        (
-            "deadline_exceeded",
-            "draining",
-            "engine_unavailable",
-            "state_unavailable",
-            "store_unavailable",
-            "worker_died",
-        ),
         "operations#faults",
     ),
+    "draining": Code(503, "Draining", "The service is shutting down.", "operations#faults"),
+    "deadline_exceeded": Code(
+        504,
+        "Deadline exceeded",
+        "The answer was not ready within the time limit.",
+        "operations#faults",
+    ),
+    "storage_full": Code(
+        507,
+        "Storage full",
+        "The store has no room left, or its disk is read-only.",
+        "operations#the-store",
+    ),
 }
-"""The chapter of the documents that tells more about each code, as ``geodesic docs`` takes it"""
 
 
 @dataclass(frozen=True)

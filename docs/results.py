@@ -1,7 +1,7 @@
 """Tables of benchmark results in the documents: taken from `benchmarks` when the site is built.
 
-A document asks for one by a fence, which names a file, a section of it, rows by what they begin
-with, and columns::
+A document asks for one by a fence, which names a file, a section of it, rows by their first cells,
+and columns::
 
     ```{results} RESULTS.md # Cortex
     rows: within 10 mm; whole rows
@@ -40,7 +40,7 @@ def _table(fence: re.Match[str]) -> str:
     for wanted in options["rows"]:
         matching = [row for row in rows if row[0] == wanted]
         if not matching:
-            raise LookupError(f"{path}, {title}: no row begins with {wanted}")
+            raise LookupError(f"{path}, {title}: no row {wanted}")
         found += matching
     shown = [options["columns"], ["---"] * len(places)]
     shown += [[_without_target(row[place]) for place in places] for row in found]

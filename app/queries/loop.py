@@ -77,8 +77,8 @@ class LoopQuery(Query[LoopRequest]):
         curves = to_curves(mesh, request.curves, split_points(request.curves, points))
         tight = []
         for i, curve in enumerate(curves):
-            faults = gc.errors.NoLoop, gc.errors.InvalidArgument
-            with naming(*((fault, f"/curves/{i}") for fault in faults)):
+            where = f"/curves/{i}"
+            with naming((gc.errors.NoLoop, where), (gc.errors.InvalidArgument, where)):
                 part = context.part(i, len(curves))
                 tight.append(gc.straighten(curve, free_ends=request.free_ends, **part.options))
         return tight

@@ -5,6 +5,7 @@ where both ends are on two edges: steps that shorten it lead to the shortest.
 """
 
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +25,7 @@ from geodesic_core.kernels.mesh.half_edges import (
 from geodesic_core.kernels.paths import funnel
 from geodesic_core.kernels.paths.funnel import LEFT, RIGHT, String, Strip
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.tolerances import SHORTER, TAUT
+from geodesic_core.tolerances import MOST_PASSES, SHORTER, TAUT
 
 _FIXED = -1
 """The half-edge of an end that does not move"""
@@ -48,9 +49,7 @@ def has_free_end(mesh: TriangleMesh, strip: Strip, end: int) -> bool:
     return any(half_edge != _FIXED for _, half_edge in ways)
 
 
-def slid(
-    mesh: TriangleMesh, strip: Strip, is_free: tuple[bool, bool], control: Control
-) -> tuple[Strip, String]:
+def slid(mesh: TriangleMesh, strip: Strip, is_free: tuple[bool, bool], control: Control) -> Strip:
     """Return a strip with its ends where its string is shortest along their boundary edges.
 
     Each end moves at most to the next vertex; from a vertex, either way.
@@ -62,7 +61,7 @@ def slid(
             ways.append(_Way(_reversed(mesh, both), (first, half_edge)))
     parts = (control.for_part(i, len(ways)) for i in range(len(ways)))
     moved = [_shortest(mesh, way, part) for way, part in zip(ways, parts, strict=True)]
-    return min(moved, key=lambda pair: pair[1].length)
+    return min(moved, key=lambda pair: pair[1])[0]
 
 
 def _ways(mesh: TriangleMesh, strip: Strip) -> Iterator[tuple[Strip, int]]:
@@ -119,12 +118,12 @@ def _reversed(mesh: TriangleMesh, strip: Strip) -> Strip:
     return Strip(portals, strip.faces[::-1].copy(), strip.weights[::-1].copy())
 
 
-def _shortest(mesh: TriangleMesh, way: _Way, control: Control) -> tuple[Strip, String]:
-    """Return the strip of a way with its ends where its string is shortest, and the string."""
+def _shortest(mesh: TriangleMesh, way: _Way, control: Control) -> tuple[Strip, float]:
+    """Return the strip of a way with its ends where its string is shortest, and that length."""
     edges, ends = _unfolded(mesh, way)
     places = np.clip([_place(way, k) for k in (0, 1)], _INSIDE, 1.0 - _INSIDE)
-    string = _string_of(mesh, _moved(way, places))
-    for part in rounds(control):
+    string = string_of(mesh, _moved(way, places))
+    for part in islice(rounds(control), MOST_PASSES):
         part.checkpoint(0.0)
         bends = [
             ends[bend, 0:2] if side == LEFT else ends[bend, 2:4]
@@ -134,7 +133,7 @@ def _shortest(mesh: TriangleMesh, way: _Way, control: Control) -> tuple[Strip, S
         shorter = None
         for _ in range(_HALVINGS):
             trial = np.clip(places + steps, _INSIDE, 1.0 - _INSIDE)
-            found = _string_of(mesh, _moved(way, trial))
+            found = string_of(mesh, _moved(way, trial))
             if found.length < string.length * (1.0 - SHORTER):
                 shorter = trial, found
                 break
@@ -144,8 +143,7 @@ def _shortest(mesh: TriangleMesh, way: _Way, control: Control) -> tuple[Strip, S
         places, string = shorter
     places[places <= _INSIDE], places[places >= 1.0 - _INSIDE] = 0.0, 1.0
     strip = _moved(way, places)
-    strip, string, _ = funnel.straightened(mesh.topology, strip, TAUT, 0.0, 0)
-    return strip, string
+    return strip, string_of(mesh, strip).length
 
 
 def _place(way: _Way, end: int) -> float:
@@ -164,7 +162,7 @@ def _moved(way: _Way, places: Floats) -> Strip:
     return Strip(way.strip.portals, way.strip.faces, weights)
 
 
-def _string_of(mesh: TriangleMesh, strip: Strip) -> String:
+def string_of(mesh: TriangleMesh, strip: Strip) -> String:
     """Return the string of a strip."""
     return funnel.straightened(mesh.topology, strip, TAUT, 0.0, 0)[1]
 
@@ -179,7 +177,7 @@ def _unfolded(mesh: TriangleMesh, way: _Way) -> tuple[Floats, Floats]:
         of_faces, ends = [corners, corners], np.empty((0, 4))
     else:
         centred = Strip(portals, faces, np.full((2, 3), 1.0 / 3.0))
-        ends = _string_of(mesh, centred).ends
+        ends = string_of(mesh, centred).ends
         of_faces = []
         for portal, row, centre in (
             (mesh.topology.links[portals[0], OPPOSITE], [2, 3, 0, 1], np.zeros(2)),

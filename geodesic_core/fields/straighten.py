@@ -15,7 +15,7 @@ import numpy as np
 from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.control import Control, rounds
 from geodesic_core.errors import InternalError, InvalidArgument, NoLoop
-from geodesic_core.fields.free_ends import has_free_end, slid
+from geodesic_core.fields.free_ends import has_free_end, slid, string_of
 from geodesic_core.kernels.mesh.half_edges import HEAD, OPPOSITE, TAIL
 from geodesic_core.kernels.paths import funnel
 from geodesic_core.kernels.paths.funnel import LEFT, NEITHER, RIGHT, String, Strip
@@ -146,7 +146,7 @@ def _freed(
         if best is not None and string.length >= best[1].length * (1.0 - SHORTER):
             return best
         best = strip, string
-        strip, _ = slid(mesh, strip, is_free, part.for_part(1, 2))
+        strip = slid(mesh, strip, is_free, part.for_part(1, 2))
     raise _endless()
 
 
@@ -232,8 +232,7 @@ def _unrolled(mesh: TriangleMesh, strip: Strip, portals: Ints) -> Floats:
     again = np.append(portals, portals[:1])
     faces = np.array([strip.faces[0], again[-1] // 3])
     weights = np.stack([strip.weights[0], np.full(3, 1.0 / 3.0)])
-    _, string, _ = funnel.straightened(mesh.topology, Strip(again, faces, weights), TAUT, 0.0, 0)
-    return string.ends
+    return string_of(mesh, Strip(again, faces, weights)).ends
 
 
 def _junctions(mesh: TriangleMesh, strip: Strip) -> Iterator[tuple[int, Ints]]:

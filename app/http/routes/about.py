@@ -7,7 +7,7 @@ from starlette.responses import PlainTextResponse
 
 from app import __version__
 from app.encoding import FORMATS, JSON
-from app.errors import CHAPTERS, CODES, draining, problem
+from app.errors import CODES, draining, problem
 from app.http import page
 from app.http.dependencies import ServiceDep
 from app.http.metrics import Metrics
@@ -164,4 +164,4 @@ async def get_problem(code: str, response: Response) -> ProblemCode:
     if code not in CODES:
         raise problem("not_found", f"there is no code {code!r}; the codes are {', '.join(CODES)}")
     response.headers["Cache-Control"] = "public, max-age=86400"
-    return ProblemCode(code=code, chapter=CHAPTERS[code], **vars(CODES[code]))
+    return ProblemCode(code=code, **vars(CODES[code]))

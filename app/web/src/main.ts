@@ -94,8 +94,9 @@ exportPanel.drawn = () => {
       ...{ mesh, palette: store.state.palette, field: fields.scale(store.state) },
       lines: [
         ...(path.length > 1 ? [{ name: "path", points: path, colour: ROUTE }] : []),
-        ...isolines.lines.map(({ points }) => ({
-          ...{ name: "isoline", points: points ?? [], colour: ISOLINE },
+        ...isolines.lines.map(({ points, closed }) => ({
+          ...{ name: "isoline", colour: ISOLINE },
+          points: closed ? [...(points ?? []), ...(points ?? []).slice(0, 1)] : (points ?? []),
         })),
       ],
     }

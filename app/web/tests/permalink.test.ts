@@ -25,7 +25,7 @@ function randomState(random: Random): State {
     effort: random.pick([1, 2, 4, 8] as const),
     maxDistance: random.pick([null, random.size()]),
     slope: random.pick([null, { rule: "tobler", up: "z" }, { rule: "naismith", up: "y" }] as const),
-    tolls: null,
+    faceCosts: null,
     values: null,
     isReadable: true,
     unit: random.pick(["", "mm", "µm & more"]),

@@ -440,7 +440,7 @@ export class GeodesicClient {
   }
 }
 
-/** Return a question as the body of a request: in the service's names, without what is no member. */
+/** Return a question as the body of a request: its members, by the service's names. */
 export function toWire({
   signal: _,
   onProgress: __,
@@ -475,7 +475,7 @@ function listOf<T>(values: T | T[]): T[] {
   return Array.isArray(values) ? values : [values];
 }
 
-/** Return the members of an answer that an array has no room for. */
+/** Return the members of an answer that are in headers, as an array has no place for them. */
 function membersOf({ headers }: Response, usual: object = {}): Record<string, unknown> {
   const members = [...headers].flatMap(([header, value]) => {
     const [, name] = /^geodesic-(.+)$/.exec(header) ?? [];

@@ -32,7 +32,7 @@ export type Source = Schemas["DistancesRequest"]["sources"][number];
 export type Method = NonNullable<Schemas["DistancesRequest"]["method"]>;
 export type Effort = NonNullable<Schemas["DistancesRequest"]["effort"]>;
 
-/** What asks, and what answers, by the end of its address. */
+/** Request and answer of each query, by the last part of its address. */
 export interface Queries {
   distances: { request: Schemas["DistancesRequest"]; answer: Schemas["DistancesAnswer"] };
   path: { request: Schemas["PathRequest"]; answer: PathAnswer };
@@ -78,7 +78,7 @@ export interface Call extends Stop {
   onProgress?: ((share: number) => void) | undefined;
 }
 
-/** What may be left out of a question, and of what is given apart. */
+/** The members of a request that are not arguments, and how the work is watched and stopped. */
 export type Options<K extends Kind, Given extends keyof Question<K> = never> = Partial<
   Omit<Question<K>, Given>
 > &

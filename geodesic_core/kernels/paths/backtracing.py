@@ -214,7 +214,7 @@ class Forks(NamedTuple):
 
 @kernel
 def new_forks() -> Forks:
-    """Return forks of a path to come."""
+    """Return an empty stack of forks, of which nothing has been tried."""
     return Forks(
         np.empty((FORKS, 5)),
         np.empty((FORKS, 4), np.int32),
@@ -616,9 +616,9 @@ def is_past_start(view: View, line: Line, walk: Walk) -> bool:
 
 @kernel
 def was_tried(view: View, forks: Forks, walk: Walk, first: int) -> bool:
-    """Whether a walk of the line with this first node has been here before; remembers that it is.
+    """Whether a walk has been here before on the line with this first node; if not, remember it.
 
-    Walks that share a row of the table forget each other.
+    A walk takes the place of the one in its row of the table.
     """
     h, length = walk.half_edge, view.mesh.geometry[ROW * walk.half_edge + LENGTH]
     row = (31 * h + int(256.0 * walk.x / length)) % TRIED

@@ -52,6 +52,9 @@ export class Borders {
 
 /** Return a question for borders, which are exact by any method. */
 export function bordersOf(state: State): Question<"borders"> {
-  const { method: _, ...question } = questionOf({ ...state, slope: null, tolls: null }, "exact");
+  const { method: _, ...question } = questionOf(
+    { ...state, slope: null, faceCosts: null },
+    "exact",
+  );
   return question;
 }

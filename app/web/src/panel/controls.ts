@@ -161,8 +161,8 @@ export class Controls {
       option.disabled = option.value === state.method;
     byId("slope", HTMLSelectElement).value = state.slope?.rule ?? "";
     byId("cost-now").textContent = !hasCost(state)
-      ? "their length"
-      : [state.slope?.rule, state.tolls?.name].filter(Boolean).join(" × ");
+      ? "length"
+      : [state.slope?.rule, state.faceCosts?.name].filter(Boolean).join(" × ");
     byId("boundary", HTMLInputElement).checked = state.boundary;
     setValue("error-slider", String(Math.log10(state.error)));
     showError(state.error);

@@ -13,7 +13,7 @@ export class Numbers {
     private readonly size: () => { vertices: number; faces: number } | null,
   ) {
     const file = byId("numbers", HTMLInputElement);
-    for (const id of ["values-pick", "tolls-pick"])
+    for (const id of ["values-pick", "face-costs-pick"])
       byId(id).addEventListener("click", () => file.click());
     file.addEventListener("change", () => {
       if (file.files?.[0]) this.take(file.files[0]);
@@ -22,7 +22,7 @@ export class Numbers {
     byId("values-remove").addEventListener("click", () =>
       store.update({ values: null, least: null, range: null }),
     );
-    byId("tolls-remove").addEventListener("click", () => store.update({ tolls: null }));
+    byId("face-costs-remove").addEventListener("click", () => store.update({ faceCosts: null }));
   }
 
   /** Take the numbers of a file for what there are as many of on the mesh. */
@@ -36,7 +36,7 @@ export class Numbers {
       if (length === size.vertices) {
         this.store.update({ values: read, least: null, range: null });
       } else if (length === size.faces) {
-        this.store.update({ tolls: costs(read) });
+        this.store.update({ faceCosts: costs(read) });
       } else {
         const here = `${count(size.vertices, "vertex", "vertices")} and ${count(size.faces, "face")}`;
         throw new InputError(
@@ -48,10 +48,10 @@ export class Numbers {
     });
   }
 
-  show({ values, tolls }: State): void {
+  show({ values, faceCosts }: State): void {
     for (const [id, read] of [
       ["values", values],
-      ["tolls", tolls],
+      ["face-costs", faceCosts],
     ] as const) {
       byId(`${id}-row`).hidden = read === null;
       byId(`${id}-pick`).hidden = read !== null;

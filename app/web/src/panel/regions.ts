@@ -30,7 +30,7 @@ export class Regions {
     });
   }
 
-  /** Add points to the starts, each the farthest from those before; they take the place of the rest. */
+  /** Add points to the starts, each the farthest from those before. Other places are dropped. */
   private spread(kind: string, value: number): void {
     const { state } = this.store;
     const { mesh, barriers } = state;

@@ -102,7 +102,7 @@ export function readState(search: string): WrittenState {
     effort: EFFORTS.find((effort) => String(effort) === query.get("effort")) ?? INITIAL.effort,
     maxDistance: positive(query.get("max_distance")),
     slope: readSlope(query.get("slope")),
-    tolls: null,
+    faceCosts: null,
     values: null,
     isReadable: true,
     unit: query.get("unit")?.slice(0, LONGEST_UNIT) ?? "",

@@ -42,7 +42,7 @@ export interface State {
   maxDistance: number | null;
   /** What ways cost, by slope and by face; if anything, costs take the place of distances. */
   slope: Slope | null;
-  tolls: Values | null;
+  faceCosts: Values | null;
   /** Values of vertices, which take the place of distances. */
   values: Values | null;
   /** Whether all fields of the question can be read; as long as one cannot, there is no question. */
@@ -88,7 +88,7 @@ export const INITIAL: State = {
   effort: 2,
   maxDistance: null,
   slope: null,
-  tolls: null,
+  faceCosts: null,
   values: null,
   isReadable: true,
   unit: "",
@@ -156,7 +156,7 @@ export class Store {
   /** Change the state by what is no step of the user's, or follows from one. */
   replace(change: Partial<State>): void {
     const before = this.current;
-    const asks = ["mesh", "slope", "tolls", ...Object.keys(NO_QUESTION)].some(
+    const asks = ["mesh", "slope", "faceCosts", ...Object.keys(NO_QUESTION)].some(
       (name) => name in change,
     );
     this.current = { ...before, isReadable: before.isReadable || asks, ...change };
@@ -211,7 +211,7 @@ export function withMesh(mesh: string, { lines }: State): Partial<State> {
     ...NO_QUESTION,
     unit: "",
     slope: null,
-    tolls: null,
+    faceCosts: null,
     values: null,
     least: null,
     range: null,

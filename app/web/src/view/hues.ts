@@ -1,4 +1,4 @@
-// Which colour each territory has: neighbours never the same, as far as the colours go.
+// Colours of territories: neighbours differ, as far as the colours go.
 import type { LoadedMesh } from "../mesh/loader";
 import { HUES } from "./colours";
 
