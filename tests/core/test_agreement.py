@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 import geodesic_core as gc
 from tests.support import zoo
 from tests.support.approximation import ERRORS
-from tests.support.certificates import LENGTH, check_path
 from tests.support.known import (
     BY_ENUMERATION,
     BY_GEOMETRY,
@@ -26,6 +25,7 @@ from tests.support.known import (
     unfolded_among_barriers,
     unfolded_with_points,
 )
+from tests.support.path_checks import LENGTH, check_path
 from tests.support.random_meshes import KINDS, blocks, cases, moebius, pages, wound
 
 pytestmark = [

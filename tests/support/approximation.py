@@ -8,7 +8,7 @@ import pytest
 import geodesic_core as gc
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
-from tests.support.certificates import LENGTH, check_path
+from tests.support.path_checks import LENGTH, check_path
 
 ERRORS = (1e-4, 1e-3, 1e-2, 5e-2)
 GRANTED = (0, 1e-2) if WITHOUT_JIT else (0, *ERRORS)

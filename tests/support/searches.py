@@ -11,7 +11,7 @@ from geodesic_core.kernels.front.bounds import PruningBounds, exact_bounds
 from geodesic_core.kernels.paths import edge_dijkstra
 from geodesic_core.search.landmarks import Landmarks
 from tests.support import zoo
-from tests.support.certificates import LENGTH, check_path
+from tests.support.path_checks import LENGTH, check_path
 
 STEPS = ["dijkstra", "shorten", "approximate", "backtrace", "exact", "path"]
 

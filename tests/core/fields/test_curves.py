@@ -13,9 +13,9 @@ import geodesic_core as gc
 from geodesic_core.tolerances import ROUNDED_POSITION
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
-from tests.support.certificates import LENGTH
 from tests.support.meshes import mesh_of
 from tests.support.oracles import closed_forms, visibility
+from tests.support.path_checks import LENGTH
 from tests.support.random_meshes import KINDS, thin_terrain
 
 EXACT = 1e-9

@@ -19,8 +19,8 @@ from geodesic_core.tolerances import FAR_NEARER, LAST_BUCKET, MOST_AT_LARGE, MOS
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 from tests.support.approximation import MERGING, some_sources
-from tests.support.certificates import check_path
 from tests.support.meshes import mesh_of
+from tests.support.path_checks import check_path
 from tests.support.stepping import topology_of, window, with_pool
 
 EFFORTS = (1, 2) if WITHOUT_JIT else (1, 2, 4, 8)

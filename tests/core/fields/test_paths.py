@@ -13,8 +13,8 @@ from tests.support.approximation import (
     exact_or_not,
     solve,
 )
-from tests.support.certificates import check_path
 from tests.support.meshes import mesh_of
+from tests.support.path_checks import check_path
 
 
 def test_a_path_through_saddles_has_its_vertices_as_points():

@@ -16,8 +16,8 @@ from geodesic_core.tolerances import (
     WEIGHT_ERROR,
 )
 from tests.support import zoo
-from tests.support.certificates import check_path
 from tests.support.meshes import mesh_of, random_points
+from tests.support.path_checks import check_path
 
 EXACT = 1e-9
 """Relative error allowed against an oracle."""

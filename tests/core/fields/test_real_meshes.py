@@ -14,8 +14,8 @@ from tests.support.approximation import (
     exact_or_not,
     solve,
 )
-from tests.support.certificates import check_path
 from tests.support.meshes import named_mesh
+from tests.support.path_checks import check_path
 
 pytestmark = pytest.mark.jit
 

@@ -11,8 +11,8 @@ from geodesic_core.kernels.paths.straight_lines import TOGETHER
 from geodesic_core.tolerances import NO_DIRECTION, THROUGH_VERTEX
 from tests.core.fields.test_log_map import apart, sources_of
 from tests.support import zoo
-from tests.support.certificates import check_path
 from tests.support.meshes import mesh_of
+from tests.support.path_checks import check_path
 
 TURNS = np.linspace(0.1, 6.2, 13)
 

@@ -22,7 +22,7 @@ from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.paths.backtracing import NO_END, Line, Winners, is_on_path, trace_path
 from geodesic_core.tolerances import FORKS, ON_PATH, PATH_LENGTH, SAME_PLACE, TRIES
 from tests.support import zoo
-from tests.support.certificates import check_path
+from tests.support.path_checks import check_path
 from tests.support.searches import spread
 from tests.support.stepping import finished, started, topology_of
 

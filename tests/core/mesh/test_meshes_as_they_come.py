@@ -10,8 +10,8 @@ import pytest
 
 import geodesic_core as gc
 from tests.support import zoo
-from tests.support.certificates import check_path
 from tests.support.oracles import unfolding
+from tests.support.path_checks import check_path
 from tests.support.splitting import split_at
 
 SEAMLESS = zoo.SMALL["crumpled_sphere"]

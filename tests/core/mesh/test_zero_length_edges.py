@@ -9,8 +9,8 @@ import geodesic_core as gc
 from geodesic_core.kernels.mesh.locations import Locations
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
-from tests.support.certificates import check_path
 from tests.support.meshes import random_points
+from tests.support.path_checks import check_path
 from tests.support.searches import buy_landmarks
 
 ALL = zoo.SMALL | zoo.IRREGULAR

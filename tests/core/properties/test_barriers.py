@@ -8,9 +8,9 @@ from hypothesis import given
 
 import geodesic_core as gc
 from tests.core.properties.test_exact import seeds
-from tests.support.certificates import check_path
 from tests.support.known import blocked_at_random
 from tests.support.meshes import mesh_of
+from tests.support.path_checks import check_path
 from tests.support.random_meshes import cases
 
 pytestmark = pytest.mark.filterwarnings("ignore::geodesic_core.errors.BlockedSource")

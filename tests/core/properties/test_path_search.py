@@ -7,9 +7,9 @@ from hypothesis import given
 import geodesic_core as gc
 from tests.core.properties.test_approximate import split_cases
 from tests.core.properties.test_exact import seeds
-from tests.support.certificates import LENGTH
 from tests.support.meshes import mesh_of
 from tests.support.oracles import unfolding
+from tests.support.path_checks import LENGTH
 from tests.support.random_meshes import cases
 from tests.support.searches import STEPS, check_search, random_pairs
 

@@ -9,8 +9,8 @@ import geodesic_core as gc
 from geodesic_core.search.path_search import FAST_PATH
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
-from tests.support.certificates import LENGTH, check_path
 from tests.support.meshes import named_mesh
+from tests.support.path_checks import LENGTH, check_path
 from tests.support.searches import answer, random_pairs, solver_of
 
 FAR = (0, 5000)

@@ -6,7 +6,7 @@ import pytest
 import geodesic_core as gc
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
-from tests.support.certificates import LENGTH
+from tests.support.path_checks import LENGTH
 from tests.support.searches import (
     check_search,
     check_searches,

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from tests.support.certificates import LENGTH
 from tests.support.meshes import named_mesh
+from tests.support.path_checks import LENGTH
 from tests.support.searches import check_search, landmark_count
 
 SLICE = [

@@ -7,7 +7,7 @@ import pytest
 
 import geodesic_core as gc
 from tests.support import zoo
-from tests.support.certificates import check_path
+from tests.support.path_checks import check_path
 
 SOURCE, TARGET = 0, 45
 EDGE = 3
