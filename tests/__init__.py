@@ -10,5 +10,6 @@
 ``scripts/test --quick`` leaves out ``service``, ``page`` and what is marked ``slow``;
 ``scripts/test``, like plain ``pytest``, runs everything, of tests marked ``slice(count)`` a seeded
 sample of that many cases, of files marked ``file_slice(count)`` one of that many tests, unless they
-are named; ``scripts/test --full`` runs these whole, and what is marked ``full``.
+are named; ``scripts/test --full`` runs these whole, and what is marked ``full`` or ``plain``.
+What is marked ``plain`` runs in ``scripts/coverage`` as well, and what is marked ``jit`` does not.
 """

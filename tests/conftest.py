@@ -38,10 +38,12 @@ LONGEST = (
     "test_replicas.py",
     "test_object_store.py",
     "test_agreement.py",
-    "test_trimming.py",
+    "test_document_sessions.py",
+    "test_start.py",
+    "test_logs.py",
 )
 NOT_QUICK = ("service", "page", "slow")
-FULL_ONLY = ("full",)
+FULL_ONLY = ("full",) if WITHOUT_JIT else ("full", "plain")
 EXAMPLES = {"quick": 4, "slice": 6, "full": 2000, "interpreted": 4}
 """Random examples of a property, by tier; kernels as plain Python take a hundred times as long."""
 
@@ -184,6 +186,8 @@ def _test_of(item: pytest.Item) -> str:
 
 
 def _size_of_slice(config: pytest.Config, item: pytest.Item) -> int:
+    if WITHOUT_JIT and item.get_closest_marker("plain"):
+        return MOST_CASES
     if WITHOUT_JIT:
         return CASES_OF_READERS if item.path.parent.name == "io" else CASES_WITHOUT_JIT
     marker = item.get_closest_marker("slice")

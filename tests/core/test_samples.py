@@ -167,6 +167,7 @@ def test_the_cortex_is_folded_and_flat_on_one_side_and_seen_from_outside() -> No
     assert area > 1.2 * ellipsoid, "a surface around the same room, without folds, has less"
 
 
+@pytest.mark.jit
 def test_the_obstacles_are_seen_from_above_and_have_holes_to_walk_around() -> None:
     sample = samples.obstacles(20_000)
     vertices, faces = sample.vertices, sample.faces

@@ -9,11 +9,8 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
-import httpx2
 import numpy as np
 import pytest
-import trimesh
-from PIL import Image
 from playwright.sync_api import FilePayload, Route, expect
 
 from tests.page.conftest import sample
@@ -881,49 +878,6 @@ def test_a_permalink_to_nothing(view: View) -> None:
     view.wait("error")
 
     assert view.text("#error-title") == "Mesh not found"
-
-
-def test_downloads(view: View, knot: str, tmp_path: Path) -> None:
-    view.open(f"/?mesh={knot}&source=v0&target=v1000")
-    view.unfold("export")
-    with view.page.expect_download() as download:
-        view.page.click("#download-distances >> text=NPY")
-    download.value.save_as(tmp_path / "d.npy")
-    distances = np.load(tmp_path / "d.npy")
-    assert distances[0] == 0
-    assert distances[1000] == pytest.approx(length_of(view), rel=1e-5)
-
-    with view.page.expect_download() as download:
-        view.page.click("#picture")
-    assert download.value.suggested_filename == "geodesic.png"
-    download.value.save_as(tmp_path / "p.png")
-    picture = np.asarray(Image.open(tmp_path / "p.png").convert("RGB"), int)
-    assert (np.abs(picture - PATH).max(axis=2) < 12).sum() > 100
-
-    with view.page.expect_download() as download:
-        view.page.click("#glb")
-    download.value.save_as(tmp_path / "g.glb")
-    scene = trimesh.load_scene(tmp_path / "g.glb")
-    surface, path = (scene.geometry[scene.graph[name][1]] for name in ("surface", "path"))
-    assert path.length == pytest.approx(length_of(view), rel=1e-5)
-    assert len(surface.vertices) == len(distances)
-    colours = np.asarray(surface.visual.vertex_attributes["color"])[:, :3]
-    near, far = colours[np.argmin(distances)], colours[np.argmax(distances)]
-    assert near.mean() < far.mean(), "from dark to light"
-
-    with view.page.expect_download() as download:
-        view.page.click("#geojson")
-    download.value.save_as(tmp_path / "g.geojson")
-    features = json.loads((tmp_path / "g.geojson").read_text())["features"]
-    assert {each["properties"]["name"] for each in features} == {"path", "isoline"}
-    (line,) = (each for each in features if each["properties"]["name"] == "path")
-    steps = np.diff(line["geometry"]["coordinates"], axis=0)
-    assert np.linalg.norm(steps, axis=1).sum() == pytest.approx(length_of(view), rel=1e-5)
-
-    written = set(httpx2.get(view.page.url.split("/?")[0] + "/v1").json()["answer_formats"])
-    for what, formats in {"path": {"obj", "csv"}, "isolines": {"obj", "csv"}}.items():
-        offered = {text.lower() for text in view.text(f"#download-{what}").split()}
-        assert offered == formats & written
 
 
 def test_copied_programs_run(view: View, knot: str) -> None:

@@ -259,6 +259,7 @@ def test_other_formats_and_links(client: TestClient, terrain: str) -> None:
     check_problem(ask(client, "0" * 32, "cut", curves=[CURVE]), 404, "mesh_not_found")
 
 
+@pytest.mark.slice(2)
 @pytest.mark.parametrize(
     ("settings", "headers", "status", "code"),
     [

@@ -267,6 +267,7 @@ def test_a_mesh_that_is_deleted_while_it_is_pulled_is_gone(service: ServiceClien
     assert copies_of(service) == set()
 
 
+@pytest.mark.slice(2)
 @pytest.mark.parametrize(
     ("store", "environment", "said"),
     [

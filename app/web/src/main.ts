@@ -71,7 +71,7 @@ const cutting = new Cutting(
   () => meshes.list(),
 );
 new Regions(store, status, notes);
-const exportPanel = new ExportPanel(store, status, stage);
+const exportPanel = new ExportPanel(store, status, sceneView);
 const player = new Player(store, status, sceneView, () => {
   fields.paint(store.state);
   void showWires(store.state);

@@ -18,7 +18,7 @@ from tests.support import zoo
 from tests.support.invariants import windows_of
 from tests.support.stepping import topology_of, view_of_arrays
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.plain
 
 ANGLES = 1e-6
 """Radians: some widenings by SECTOR_MARGIN."""

@@ -244,6 +244,7 @@ def test_larger_efforts_run_exactly_where_that_is_as_quick(effort):
     assert together.tobytes() == gc.distance_matrix(mesh, [3]).tobytes()
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize(
     ("faces", "is_rough", "fast"),
     [

@@ -424,7 +424,7 @@ def test_nothing_is_shared_between_calls():
             assert other.points.any()
 
 
-@pytest.mark.slow
+@pytest.mark.plain
 @zoo.each_scale
 @pytest.mark.parametrize("share", [-3.0, -0.5, 0.5, 3.0])
 def test_level_is_how_near_two_circles_count_as_one(scale, share):

@@ -40,6 +40,7 @@ def leaves_as_told(log_map: gc.LogMap, path: gc.GeodesicPath, v: int) -> bool:
     return bool(np.linalg.norm(line.points[-1] - path.points[0] - 0.1 * way) <= 1e-3 * reach)
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("wound_at_random", [False, True])
 def test_in_the_plane_vectors_stay_as_they_are(wound_at_random):
     vertices, faces = zoo.grid(9, 7, seed=2, jitter=0.22)

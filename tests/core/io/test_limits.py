@@ -199,6 +199,7 @@ COUNTED: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.slow
+@pytest.mark.slice(3)
 @pytest.mark.parametrize("name", COUNTED)
 def test_glb_scenes_are_counted_before_they_are_walked(
     monkeypatch: pytest.MonkeyPatch, name: str

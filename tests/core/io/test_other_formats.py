@@ -72,6 +72,7 @@ def test_too_many_faces_are_refused(name: str, tmp_path: Path) -> None:
         gc.load_mesh(FILES[name][0](tmp_path), max_faces=319)
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("name", FILES)
 def test_a_file_that_was_cut_is_damaged(name: str, tmp_path: Path) -> None:
     path = FILES[name][0](tmp_path)

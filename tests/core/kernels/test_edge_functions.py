@@ -6,6 +6,8 @@ import pytest
 from geodesic_core.kernels.certificates.edge_functions import CONE, with_pieces
 from geodesic_core.tolerances import NARROW
 
+pytestmark = pytest.mark.plain
+
 
 def value_of(cones, x):
     """Cones (N, 5) at x, infinite beyond their ends."""

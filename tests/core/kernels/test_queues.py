@@ -3,6 +3,7 @@
 from collections import deque
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -12,6 +13,8 @@ from geodesic_core.kernels.front.state import new_wavefront
 from tests.support import zoo
 from tests.support.invariants import check_heap
 from tests.support.stepping import topology_of, view_of_arrays
+
+pytestmark = pytest.mark.plain
 
 TOPOLOGY = topology_of(zoo.SMALL["crags"])
 VERTICES, HALF_EDGES = len(TOPOLOGY.total_angle), len(TOPOLOGY.links)

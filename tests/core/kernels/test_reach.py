@@ -21,7 +21,7 @@ from tests.support import zoo
 from tests.support.stepping import flat_view
 
 
-@pytest.mark.slow
+@pytest.mark.plain
 @zoo.each_scale
 def test_bend_is_all_that_a_bent_path_is_surcharged(scale):
     view, wave, h = flat_view(scale)

@@ -17,6 +17,8 @@ from geodesic_core.tolerances import DIVERGING, GAP, LOOSE_OVERLAP, OVERLAP, SLA
 from tests.support import zoo
 from tests.support.stepping import flat_view, window
 
+pytestmark = pytest.mark.plain
+
 ALONG_THE_LINE = 2e-7
 """Where both sources lie on the edge's own line the bisector has half the digits."""
 
@@ -148,7 +150,6 @@ def is_trimmed(overlap, difference, scale) -> bool:
     return ends != (left[1], right[0])
 
 
-@pytest.mark.slow
 @zoo.each_scale
 @pytest.mark.parametrize(("share", "trimmed"), [(0.5, False), (2.0, True)])
 def test_overlap_is_the_least_that_is_trimmed(scale, share, trimmed):

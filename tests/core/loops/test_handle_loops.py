@@ -50,6 +50,7 @@ def test_cut_along_them_no_handle_is_left(make, handles):
     assert gc.handle_loops(cut) == []
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("name", ["sphere", "plane", "obstacles", "terrain"])
 def test_holes_are_no_handles(name):
     assert gc.handle_loops(getattr(gc.samples, name)(2000)) == []

@@ -11,7 +11,8 @@ import type { Point } from "../state/point";
 import type { State, Store } from "../state/state";
 import type { Status } from "../status";
 import { type Drawn, glbOf } from "../view/glb";
-import type { Stage } from "../view/scene";
+import type { SceneView } from "../view/sceneView";
+import { svgOf } from "../view/svg";
 import { curlOf, pathOf, pythonOf } from "./snippets";
 
 type Product = "distances" | "path" | "isolines" | "borders";
@@ -29,8 +30,9 @@ export class ExportPanel {
   constructor(
     private readonly store: Store,
     private readonly status: Status,
-    private readonly stage: Stage,
+    view: SceneView,
   ) {
+    const { stage } = view;
     const hasKey = (): boolean => service.apiKey !== null;
     onCopy(
       "copy-link",
@@ -43,7 +45,13 @@ export class ExportPanel {
     onCopy("copy-python", "The program", () =>
       pythonOf(store.state, this.source(), service.address, hasKey()),
     );
-    byId("picture").addEventListener("click", () => this.savePicture());
+    byId("picture").addEventListener("click", () => {
+      stage.picture().toBlob((blob) => blob && download(blob, "geodesic.png"), "image/png");
+    });
+    byId("svg").addEventListener("click", () => {
+      const svg = svgOf(stage, (position) => view.isSeen(position));
+      download(svg, "geodesic.svg");
+    });
     byId("glb").addEventListener("click", () => {
       status.run("busy", "Writing what is drawn…", new AbortController(), async () => {
         const drawn = this.drawn();
@@ -99,7 +107,7 @@ export class ExportPanel {
         choice.disabled = !isThere;
     }
     for (const id of ["copy-curl", "copy-python"]) byId(id, HTMLButtonElement).disabled = !hasField;
-    for (const id of ["picture", "glb", "geojson"]) {
+    for (const id of ["picture", "svg", "glb", "geojson"]) {
       byId(id, HTMLButtonElement).disabled = state.mesh === null;
     }
   }
@@ -143,20 +151,6 @@ export class ExportPanel {
     const source = this.nearest() ?? startsOf(this.store.state)[0];
     if (!source) throw new Error("There is no source yet.");
     return source;
-  }
-
-  private savePicture(): void {
-    const { canvas } = this.stage;
-    this.stage.renderNow();
-    const picture = document.createElement("canvas");
-    picture.width = canvas.width;
-    picture.height = canvas.height;
-    const context = picture.getContext("2d");
-    if (!context) throw new Error("This browser cannot draw the picture.");
-    context.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--ground");
-    context.fillRect(0, 0, picture.width, picture.height);
-    context.drawImage(canvas, 0, 0);
-    picture.toBlob((blob) => blob && download(blob, "geodesic.png"), "image/png");
   }
 }
 

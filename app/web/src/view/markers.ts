@@ -53,6 +53,7 @@ export class Markers {
 
   show(marks: Mark[]): void {
     const geometry = new BufferGeometry();
+    geometry.userData.points = marks;
     const attribute = (numbers: number[], size: number): BufferAttribute =>
       new BufferAttribute(new Float32Array(numbers), size);
     geometry.setAttribute(
@@ -100,6 +101,7 @@ export class Markers {
       depthWrite: false,
     });
     const points = new Points(new BufferGeometry(), material);
+    points.userData.marks = { opacity, hidden: !depthTest };
     points.renderOrder = order;
     points.frustumCulled = false;
     return points;

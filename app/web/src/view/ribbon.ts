@@ -78,7 +78,8 @@ export interface Look {
 }
 
 /** Return a mesh that draws a geometry of `ribbons`. */
-export function ribbonMesh({ colour, casing, inner, width, opacity, before, order }: Look): Mesh {
+export function ribbonMesh(look: Look): Mesh {
+  const { colour, casing, inner, width, opacity, before, order } = look;
   const resolution = new Vector2();
   const material = new ShaderMaterial({
     uniforms: {
@@ -98,6 +99,7 @@ export function ribbonMesh({ colour, casing, inner, width, opacity, before, orde
     depthWrite: false,
   });
   const line = new Mesh(new BufferGeometry(), material);
+  line.userData.look = look;
   line.renderOrder = order;
   line.frustumCulled = false;
   line.onBeforeRender = (renderer) => {
@@ -138,6 +140,7 @@ export function ribbons(lines: Triple[][]): BufferGeometry {
     }
   }
   const geometry = new BufferGeometry();
+  geometry.userData.lines = drawn;
   geometry.setAttribute("position", new BufferAttribute(here, 3));
   geometry.setAttribute("previous", new BufferAttribute(previous, 3));
   geometry.setAttribute("next", new BufferAttribute(next, 3));

@@ -2,9 +2,11 @@
 import {
   ColorManagement,
   LinearSRGBColorSpace,
+  type Mesh,
   MOUSE,
   type Object3D,
   PerspectiveCamera,
+  type Points,
   Scene,
   Spherical,
   TOUCH,
@@ -28,6 +30,9 @@ const FLAT = 0.3;
 
 /** The layer of lines on the surface, which may be hidden all at once. */
 export const LINES = 1;
+
+/** Lines or points, whose data say how they are drawn and whose geometry's data say where. */
+export type Shape = Mesh | Points;
 
 export class Stage {
   private readonly scene = new Scene();
@@ -253,6 +258,35 @@ export class Stage {
     this.camera.updateProjectionMatrix();
     if (this.whole) this.lookAtAll(this.whole);
     this.invalidate();
+  }
+
+  /** Return the lines and points that are drawn, each after what lies below it. */
+  shapes(): Shape[] {
+    const found: Shape[] = [];
+    for (const scene of [this.scene, this.overlay]) {
+      const here: Shape[] = [];
+      scene.traverseVisible((object) => {
+        const { look, marks } = object.userData;
+        if ((look || marks) && this.camera.layers.test(object.layers)) here.push(object as Shape);
+      });
+      found.push(...here.sort((a, b) => a.renderOrder - b.renderOrder));
+    }
+    return found;
+  }
+
+  /** Return the picture that is drawn now, on the ground of the page. */
+  picture(): HTMLCanvasElement {
+    const { width, height } = this.canvas;
+    this.backdrop.forget();
+    this.isStill = false;
+    this.renderNow();
+    const picture = Object.assign(document.createElement("canvas"), { width, height });
+    const context = picture.getContext("2d");
+    if (!context) throw new Error("This browser cannot draw the picture.");
+    context.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--ground");
+    context.fillRect(0, 0, width, height);
+    context.drawImage(this.canvas, 0, 0);
+    return picture;
   }
 
   /** Draw now, so that the canvas can be read before the browser shows it. */
