@@ -32,7 +32,9 @@ Dem = Annotated[
 Place = Annotated[str, typer.Option("--to", metavar="X,Y", help="Where the path ends, as --from.")]
 Block = Annotated[
     list[Path] | None,
-    typer.Option(help="Polygons that no path may enter, as GeoJSON. Repeat it for more files."),
+    typer.Option(
+        help="Polygons that no path may enter: GeoJSON, GeoPackage, Shapefile. Repeat for more."
+    ),
 ]
 CostOption = Annotated[
     list[str] | None,

@@ -48,16 +48,16 @@ def burn(
         The surface, which must be a height over the plane: a `Terrain`, or anything else that
         `as_mesh` takes.
     polygons
-        A GeoJSON file or a dictionary of what is in it; a geometry of shapely; a frame or a series
-        of GeoPandas, which reads GeoPackage and Shapefile; or a list of these. Polygons and
-        multipolygons.
+        A file: GeoJSON, GeoPackage, Shapefile or another one of one layer that GDAL reads; a
+        dictionary of what is in GeoJSON; a geometry of shapely; a frame or a series of GeoPandas;
+        or a list of these. Polygons and multipolygons.
     value
         The cost of the faces inside, above 0, infinite where no path may go: one number, or one for
         each polygon.
     crs
-        That of the polygons. By default, GeoJSON is in WGS 84, unless it names another one, a frame
-        tells its own, and geometries are in the coordinates of the surface. Where the CRS of the
-        surface is not known, all are.
+        That of the polygons. By default, GeoJSON is in WGS 84, unless it names another one, other
+        files and frames tell their own, and geometries are in the coordinates of the surface. Where
+        the CRS of the surface is not known, all are.
 
     Returns
     -------

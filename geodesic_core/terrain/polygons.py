@@ -1,4 +1,4 @@
-"""Polygons as maps have them: GeoJSON, GeoPandas and shapely."""
+"""Polygons as maps have them: GeoJSON, GeoPackage and other files, GeoPandas and shapely."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,8 +12,9 @@ from geodesic_core.extras import extra
 from geodesic_core.terrain.crs import WGS84, turned
 
 Polygons = Any
-"""A path of a GeoJSON file, a dictionary of its contents, what has ``__geo_interface__``, as
-geometries of shapely and frames of GeoPandas have, or several of them"""
+"""A path of a file: GeoJSON, GeoPackage or another one that GDAL reads; a dictionary of what is in
+GeoJSON; what has ``__geo_interface__``, as geometries of shapely and frames of GeoPandas have; or
+several of them"""
 
 
 def shapely_for(call: str) -> Any:
@@ -58,7 +59,7 @@ def as_polygons(given: Polygons, ground: str | None, crs: Any) -> list[Any]:
 def _geometries(given: Polygons) -> Iterator[tuple[Any, Any]]:
     """Yield geometries as GeoJSON has them, each with its CRS; None for that of the surface."""
     if isinstance(given, str | Path):
-        yield from _of_geojson(_read(Path(given)), WGS84)
+        yield from _of_file(Path(given))
     elif hasattr(given, "__geo_interface__"):
         yield from _of_geojson(given.__geo_interface__, getattr(given, "crs", None))
     elif isinstance(given, Mapping):
@@ -70,13 +71,37 @@ def _geometries(given: Polygons) -> Iterator[tuple[Any, Any]]:
         raise InvalidArgument(f"a {type(given).__name__} holds no polygons")
 
 
-def _read(path: Path) -> Any:
+def _of_file(path: Path) -> Iterator[tuple[Any, Any]]:
     try:
-        return json.loads(path.read_bytes())
+        content = path.read_bytes()
     except OSError as error:
         raise InvalidArgument(f"cannot read {path}: {error.strerror}") from error
+    if path.suffix.lower() not in (".json", ".geojson"):
+        yield from _of_layer(path)
+        return
+    try:
+        document = json.loads(content)
     except ValueError as error:
         raise InvalidArgument(f"{path} is no GeoJSON: {error}") from error
+    yield from _of_geojson(document, WGS84)
+
+
+def _of_layer(path: Path) -> Iterator[tuple[Any, Any]]:
+    """Yield the geometries of the only layer of a file that GDAL reads."""
+    with extra("terrain", "pyogrio", "burn"):
+        import pyogrio
+    try:
+        layers = [str(name) for name, _ in pyogrio.list_layers(path)]
+        if len(layers) != 1:
+            raise InvalidArgument(
+                f"{path} has {len(layers)} layers ({', '.join(layers)}): write the one that is "
+                "meant to a file of its own"
+            )
+        about, _, geometries, _ = pyogrio.raw.read(path, columns=[])
+    except pyogrio.errors.DataSourceError as error:
+        raise InvalidArgument(f"{path} holds no polygons: {error}") from error
+    for geometry in shapely_for("burn").from_wkb(geometries):
+        yield geometry, about["crs"]
 
 
 def _of_geojson(document: Any, crs: Any) -> Iterator[tuple[Any, Any]]:

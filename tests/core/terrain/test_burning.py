@@ -4,8 +4,10 @@ import json
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
+import pyogrio
 import pyproj
 import pytest
 import shapely
@@ -167,6 +169,57 @@ def test_coordinates_are_turned_as_the_files_say(land: gc.terrain.Terrain, tmp_p
         burnt = gc.terrain.burn(land, given, 2.0, crs=crs)
         found = map_areas(burnt.mesh)[burnt.costs == 2.0].sum()
         assert found == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "driver"), [("lakes.gpkg", "GPKG"), ("lakes.shp", "ESRI Shapefile")]
+)
+def test_files_of_one_layer_are_as_their_polygons(
+    land: gc.terrain.Terrain, tmp_path: Path, name: str, driver: str
+) -> None:
+    shores = [shapely.Polygon(star((451_103.3 + 180.0 * i, 5_198_846.1), 41.0)) for i in range(2)]
+    expected = gc.terrain.burn(land, shores, [2.0, 3.0])
+    write_layer(tmp_path / name, shores, driver=driver)
+    found = gc.terrain.burn(land, tmp_path / name, [2.0, 3.0])
+    placed = [np.unique(each.mesh.vertices.round(6), axis=0) for each in (found, expected)]
+    assert_array_equal(*placed)  # a Shapefile has its rings clockwise
+    assert_areas_are_those_of(expected, found)
+
+    to_wgs84 = pyproj.Transformer.from_crs(32632, 4326, always_xy=True)
+    degrees = [shapely.transform(shore, to_wgs84.transform, interleaved=False) for shore in shores]
+    write_layer(tmp_path / name, degrees, driver=driver, crs="EPSG:4326")
+    assert_areas_are_those_of(expected, gc.terrain.burn(land, tmp_path / name, [2.0, 3.0]))
+
+
+def assert_areas_are_those_of(expected: gc.terrain.Terrain, found: gc.terrain.Terrain) -> None:
+    for value in (2.0, 3.0):
+        areas = [map_areas(each.mesh)[each.costs == value].sum() for each in (expected, found)]
+        assert areas[1] == pytest.approx(areas[0], rel=1e-6)
+
+
+def write_layer(
+    path: Path, polygons: list[shapely.Polygon], *, crs: str = "EPSG:32632", **options: Any
+) -> None:
+    names: list[np.ndarray] = [np.arange(len(polygons))]
+    pyogrio.raw.write(
+        path, shapely.to_wkb(polygons), names, ["id"], geometry_type="Polygon", crs=crs, **options
+    )
+
+
+def test_files_of_several_layers_or_none_are_refused(
+    land: gc.terrain.Terrain, tmp_path: Path
+) -> None:
+    shore = shapely.Polygon(star((451_203.3, 5_198_846.1), 97.0))
+    path = tmp_path / "map.gpkg"
+    write_layer(path, [shore], layer="lakes")
+    write_layer(path, [shore], layer="woods")
+    with pytest.raises(gc.errors.InvalidArgument, match=r"2 layers .lakes, woods.: write"):
+        gc.terrain.burn(land, path, 2.0)
+    path.write_bytes(path.read_bytes()[:999])
+    with pytest.raises(gc.errors.InvalidArgument, match="holds no polygons"):
+        gc.terrain.burn(land, path, 2.0)
+    with pytest.raises(gc.errors.InvalidArgument, match=r"missing\.gpkg: No such file"):
+        gc.terrain.burn(land, tmp_path / "missing.gpkg", 2.0)
 
 
 def test_polygons_that_are_none_are_refused(land: gc.terrain.Terrain, tmp_path: Path) -> None:
