@@ -697,14 +697,18 @@ def parse_source(text: str) -> Source:
     return Source(-1, int(face), (u, v, w), float(start or 0))
 
 
-def main() -> int:
-    """Check a certificate, and tell what it proves. Return 0, or 1 where it proves nothing."""
-    parser = argparse.ArgumentParser(description="Check a certificate of geodesic distances.")
-    parser.add_argument("mesh", type=Path, help="an .obj, .off or .npz file")
-    parser.add_argument("certificate", type=Path)
-    parser.add_argument("--source", type=parse_source, action="append", required=True)
-    parser.add_argument("--barriers", default="", help="faces that no path crosses, as 3,5,8")
-    options = parser.parse_args()
+def parser() -> argparse.ArgumentParser:
+    """Return what reads the mesh, the certificate and the question from a command line."""
+    arguments = argparse.ArgumentParser(description="Check a certificate of geodesic distances.")
+    arguments.add_argument("mesh", type=Path, help="an .obj, .off or .npz file")
+    arguments.add_argument("certificate", type=Path)
+    arguments.add_argument("--source", type=parse_source, action="append", required=True)
+    arguments.add_argument("--barriers", default="", help="faces that no path crosses, as 3,5,8")
+    return arguments
+
+
+def check(options: argparse.Namespace) -> tuple[Surface, dict[str, Array], Proof, Array, Array]:
+    """Return the surface, the file, what it proves, and where measured paths end and how long."""
     try:
         vertices, faces, lengths = read_mesh(options.mesh)
         with np.load(options.certificate, allow_pickle=False) as file:
@@ -713,10 +717,17 @@ def main() -> int:
         surface = Surface(vertices, faces, lengths, given.get("values"), blocked)
         proof = prove(surface, options.source, given)
         paths = Paths(*(given[f"path_{name}"] for name in Paths._fields))
-        ends, upper = measure(surface, options.source, paths)
-    except (Refused, OSError, ValueError, KeyError, IndexError, BadZipFile) as error:
-        kind = "" if isinstance(error, Refused) else f"{type(error).__name__}: "
-        print(f"refused: {kind}{error}", file=sys.stderr)
+        return surface, given, proof, *measure(surface, options.source, paths)
+    except (OSError, ValueError, KeyError, IndexError, BadZipFile) as error:
+        raise Refused(f"{type(error).__name__}: {error}") from None
+
+
+def main() -> int:
+    """Check a certificate, and tell what it proves. Return 0, or 1 where it proves nothing."""
+    try:
+        _, _, proof, ends, upper = check(parser().parse_args())
+    except Refused as error:
+        print(f"refused: {error}", file=sys.stderr)
         return 1
     gaps, face = upper - proof.lower[ends], int(proof.tau.argmax())
     worst, largest = int(gaps.argmax()), upper.max()
