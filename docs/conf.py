@@ -10,8 +10,11 @@ from sphinx.application import Sphinx
 DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS.parent))
 
+from docs.notebooks import write_notebooks  # noqa: E402
 from docs.results import with_results  # noqa: E402
 from tests.support.documents import pictures_of, run_examples  # noqa: E402
+
+os.environ.setdefault("PYVISTA_OFF_SCREEN", "true")
 
 project = "Geodesic"
 default_role = "py:obj"  # names in backticks lead to what they name, where it is documented
@@ -35,7 +38,7 @@ autodoc_member_order = "bysource"
 
 
 def draw(_: Sphinx) -> None:
-    """Draw the pictures that pages show, by running the examples of these pages."""
+    """Draw the pictures that pages show, and write notebooks, by running the examples of pages."""
     folder = DOCS / "drawn"
     folder.mkdir(exist_ok=True)
     before = Path.cwd()
@@ -46,6 +49,7 @@ def draw(_: Sphinx) -> None:
                 run_examples(page)
     finally:
         os.chdir(before)
+    write_notebooks(DOCS, folder)
 
 
 def leave_out_links_to_the_repository(app: Sphinx, page: str, text: list[str]) -> None:

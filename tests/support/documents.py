@@ -25,4 +25,4 @@ def run_examples(page: Path) -> int:
 
 def pictures_of(page: Path) -> set[str]:
     """Return the names of the pictures that a page shows and its examples draw."""
-    return set(re.findall(r"\]\((?:\.\./)?drawn/([^)]+)\)", page.read_text()))
+    return set(re.findall(r"\]\((?:\.\./)?drawn/([^)]+\.png)\)", page.read_text()))
