@@ -199,15 +199,15 @@ Source = Annotated[
 ]
 """A point or a curve where distances start, at ``start_distance``."""
 
-_LIST_TAG, _NAME_TAG = "as a list", "as a name"
+LIST_TAG, NAME_TAG = "as a list", "as a name"
 _POINT_TAG, _VECTOR_TAG = "as a point", "as a vector"
 _ANGLES_TAG, _VECTORS_TAG = "as angles", "as vectors"
 TAGS = frozenset(
     {
         BARE_TAG,
         *POINT_TAGS.values(),
-        _LIST_TAG,
-        _NAME_TAG,
+        LIST_TAG,
+        NAME_TAG,
         _POINT_TAG,
         _VECTOR_TAG,
         _ANGLES_TAG,
@@ -217,14 +217,15 @@ TAGS = frozenset(
 """All tags: they come in the places of faults, and are no members"""
 
 
-def _tag_of_ends(value: Any) -> str:
-    return _NAME_TAG if isinstance(value, str) else _LIST_TAG
+def tag_of_list_or_name(value: Any) -> str:
+    """Return which of two spellings a value is meant to be in."""
+    return NAME_TAG if isinstance(value, str) else LIST_TAG
 
 
 Ends = Annotated[
-    Annotated[FailFastList[Point], Field(min_length=1), Tag(_LIST_TAG)]
-    | Annotated[Literal["all"], Tag(_NAME_TAG)],
-    Discriminator(_tag_of_ends),
+    Annotated[FailFastList[Point], Field(min_length=1), Tag(LIST_TAG)]
+    | Annotated[Literal["all"], Tag(NAME_TAG)],
+    Discriminator(tag_of_list_or_name),
 ]
 """The points on one side of a matrix, or all vertices."""
 

@@ -6,16 +6,20 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import (
     BeforeValidator,
     ConfigDict,
+    Discriminator,
     Field,
     StrictBool,
     StrictInt,
+    Tag,
     model_validator,
 )
 from pydantic_core import PydanticCustomError
 
 from app.schemas.meshes import MeshName
 from app.schemas.points import (
+    LIST_TAG,
     MOST_MEMBERS,
+    NAME_TAG,
     Axis,
     Count,
     Directions,
@@ -30,6 +34,7 @@ from app.schemas.points import (
     StrictModel,
     SurfaceCurve,
     Triple,
+    tag_of_list_or_name,
 )
 
 BoundedMethod = Literal["exact", "approximate"]
@@ -114,6 +119,14 @@ class AmongBarriers(QueryBody):
     )
 
 
+Slope = Annotated[
+    Annotated[Literal["tobler", "naismith"], Tag(NAME_TAG)]
+    | Annotated[FailFastList[tuple[Number, Positive]], Tag(LIST_TAG)],
+    Discriminator(tag_of_list_or_name),
+]
+"""What ways cost by their slope: a rule of walkers, or pairs of a slope and its cost."""
+
+
 class SurfaceCost(StrictModel):
     """What ways cost: by face, by slope, or by the product of both."""
 
@@ -121,7 +134,7 @@ class SurfaceCost(StrictModel):
         default=None,
         description="What a unit of length costs in each face, above 0; `null` where no path goes",
     )
-    slope: Literal["tobler", "naismith"] | FailFastList[tuple[Number, Positive]] | None = Field(
+    slope: Slope | None = Field(
         default=None,
         description="What a unit of length on the map costs by its slope in the direction of "
         "travel: `tobler` and `naismith` are seconds a metre; or pairs of a slope, ascending, and "

@@ -224,7 +224,7 @@ def check_place(problem: Any, sent: Sent) -> None:
         if not fault["pointer"].startswith(("/header/", "/query/")):
             assert sent.body is not None
             is_missing = fault["message"].startswith(
-                ("Field required", "give levels", "give sources, or values")
+                ("Field required", "give levels", "give sources, or values", "give at least one of")
             )
             assert is_there(json.loads(sent.body), fault["pointer"]) != is_missing, fault
 

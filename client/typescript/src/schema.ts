@@ -3271,10 +3271,10 @@ export interface components {
              * @description What a unit of length on the map costs by its slope in the direction of travel: `tobler` and `naismith` are seconds a metre; or pairs of a slope, ascending, and its cost, which must be convex
              * @example tobler
              */
-            slope?: ("tobler" | "naismith") | [
+            slope?: (("tobler" | "naismith") | [
                 number,
                 number
-            ][] | null;
+            ][]) | null;
             /**
              * Up
              * @description For `slope`: the axis of heights. Default: `+z`
