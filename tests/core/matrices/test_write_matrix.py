@@ -8,7 +8,6 @@ import multiprocessing
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +28,6 @@ from tests.support.faults import flip_bytes
 from tests.support.meshes import mesh_of, random_points
 from tests.support.oracles import unfolding
 from tests.support.splitting import split_at
-from tests.support.waiting import wait_until
 
 pytestmark = pytest.mark.file_slice(5)
 
@@ -181,32 +179,44 @@ def test_the_facts_hold_all_that_the_table_is_made_from(mesh, tmp_path):
 
 
 KILLED = """
-import sys
+import os, signal, sys
 import geodesic_core as gc
 from geodesic_core.matrices import plan
 from geodesic_core.matrices import matrix_file
+from geodesic_core.matrices.blocks import Blocks
 
-plan._BLOCK_ROWS = int(sys.argv[2])
+out, size, rows, blocks = sys.argv[1], *map(int, sys.argv[2:])
+
+def killing(method, is_time):
+    def then_kill(self, *arguments):
+        method(self, *arguments)
+        if is_time(self):
+            os.kill(os.getpid(), signal.SIGKILL)
+    return then_kill
+
+if rows:
+    Blocks.keep = killing(Blocks.keep, lambda kept: len(kept.kept(0)) >= rows)
+if blocks:
+    Blocks.put = killing(Blocks.put, lambda put: len(list(put.folder.glob("*.crc32"))) >= blocks)
+plan._BLOCK_ROWS = size
 matrix_file._KEPT_SECONDS = 0.0
 mesh = gc.samples.sphere(1280)
-print(gc.write_matrix(mesh, sys.argv[1], range(0, 640, 10), threads=2).swept)
+print(gc.write_matrix(mesh, out, range(0, 640, 10), threads=2).swept)
 """
 
 
-def run_killed(out: Path, rows: int, is_time: Callable[[Path], bool]) -> int:
-    """Run the script with blocks of so many rows, and kill it when it is time; return its code."""
-    command = [sys.executable, "-c", KILLED, out, str(rows)]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL)  # noqa: S603 - this Python
-    folder = out.with_name(f".{out.name}.part")
-    wait_until(lambda: is_time(folder) or process.poll() is not None)
-    process.kill()
-    return process.wait()
+def run(
+    out: Path, size: int, *, rows: int = 0, blocks: int = 0
+) -> subprocess.CompletedProcess[str]:
+    """Run the script with blocks of a size, until so many rows of the first or blocks are kept."""
+    command = [sys.executable, "-c", KILLED, out, *map(str, (size, rows, blocks))]
+    return subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - this Python
 
 
-def run_to_its_end(out: Path, rows: int) -> int:
+def run_to_its_end(out: Path, size: int) -> int:
     """Run the script with blocks of so many rows; return the number of rows that it computed."""
-    command = [sys.executable, "-c", KILLED, out, str(rows)]
-    done = subprocess.run(command, check=True, capture_output=True, text=True)  # noqa: S603 - this Python
+    done = run(out, size)
+    assert done.returncode == 0, done.stderr
     return int(done.stdout)
 
 
@@ -306,11 +316,7 @@ def test_a_process_that_is_killed_goes_on_where_it_was(suffix, tmp_path):
     whole, out = tmp_path / f"whole{suffix}", tmp_path / f"killed{suffix}"
     assert run_to_its_end(whole, 2) == 64
     for blocks in (1, 9, 20):
-
-        def has_blocks(folder: Path, blocks: int = blocks) -> bool:
-            return len(list(folder.glob("*.crc32"))) >= blocks
-
-        assert run_killed(out, 2, has_blocks) == -signal.SIGKILL
+        assert run(out, 2, blocks=blocks).returncode == -signal.SIGKILL
     assert run_to_its_end(out, 2) <= 24
     assert out.read_bytes() == whole.read_bytes()
 
@@ -322,10 +328,7 @@ def test_a_process_that_is_killed_within_a_block_keeps_the_rows_that_are_done(su
     whole, out = tmp_path / f"whole{suffix}", tmp_path / f"killed{suffix}"
     assert run_to_its_end(whole, 64) == 64
 
-    def has_rows(folder: Path) -> bool:
-        return len(Blocks(folder).kept(0)) >= 20
-
-    assert run_killed(out, 64, has_rows) == -signal.SIGKILL
+    assert run(out, 64, rows=20).returncode == -signal.SIGKILL
     assert not list(tmp_path.glob(".*/*.crc32")), "the only block is not complete"
     assert 0 < run_to_its_end(out, 64) <= 44
     assert out.read_bytes() == whole.read_bytes()
