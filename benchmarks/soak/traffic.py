@@ -34,7 +34,7 @@ from benchmarks.soak.plan import (
 )
 
 DICE = Random(21)  # noqa: S311 - no secret
-LIMITS = {(429, "rate_limited"), (429, "quota_exceeded"), (503, "queue_full")}
+LIMITS = {(429, "rate_limited"), (503, "queue_full")}
 """Refusals that anybody may meet, since others take what there is"""
 ASYNC = {"Prefer": "respond-async"}
 LONG_S = 300.0

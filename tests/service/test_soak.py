@@ -28,7 +28,6 @@ OUTCOMES = {
     "404 mesh_not_found",
     "410 job_dismissed",
     "422 invalid_request",
-    "429 quota_exceeded",
     "504 deadline_exceeded",
     "client left",
 }
