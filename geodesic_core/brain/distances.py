@@ -14,7 +14,7 @@ from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument
 from geodesic_core.fields.methods import Accuracy, Effort, Method
 from geodesic_core.matrices.formats import SUFFIXES, Facts
-from geodesic_core.matrices.matrix_file import Form, MatrixFile, write_formed
+from geodesic_core.matrices.matrix_file import Asked, Form, MatrixFile, write_formed
 
 _DCONN, _NIFTI = ".dconn.nii", ".nii"
 
@@ -93,13 +93,8 @@ def write_distances(
     return write_formed(
         cortex.mesh,
         path,
-        cortex.region,
-        None,
+        Asked(cortex.region, None, max_distance, (), dtype, threads),
         Form(cortex.facts, are_inside=True, dense_writers={_NIFTI: write_dconn}),
         Accuracy(method, relative_error, absolute_error, effort),
-        max_distance,
-        (),
-        dtype,
-        threads,
         Control(progress, cancel, deadline_s, memory_limit),
     )

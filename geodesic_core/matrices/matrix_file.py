@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -162,14 +162,9 @@ def write_matrix(
     return write_formed(
         as_mesh(mesh),
         out,
-        sources,
-        targets,
+        Asked(sources, targets, max_distance, barriers, dtype, threads),
         Form(),
         Accuracy(method, relative_error, absolute_error, effort),
-        max_distance,
-        barriers,
-        dtype,
-        threads,
         Control(progress, cancel, deadline_s, memory_limit),
     )
 
@@ -185,20 +180,27 @@ class Form:
     """By suffix: what writes a dense matrix, which is mapped"""
 
 
+class Asked(NamedTuple):
+    """The arguments of `write_matrix` that say which distances, as they are given."""
+
+    sources: Points | Everywhere
+    targets: Points | Everywhere | None
+    max_distance: float | None
+    barriers: Iterable[int]
+    dtype: Literal["float64", "float32"]
+    threads: int | None
+
+
 def write_formed(
     mesh: TriangleMesh,
     out: str | Path,
-    sources: Points | Everywhere,
-    targets: Points | Everywhere | None,
+    asked: Asked,
     form: Form,
     accuracy: Accuracy,
-    max_distance: float | None,
-    barriers: Iterable[int],
-    dtype: Literal["float64", "float32"],
-    threads: int | None,
     control: Control,
 ) -> MatrixFile:
     """Write a matrix to a file of some form; see `write_matrix`."""
+    sources, targets, max_distance, barriers, dtype, threads = asked
     limit = as_limit(max_distance)
     check_choice("dtype", dtype, ("float64", "float32"))
     most = as_threads(threads)

@@ -110,8 +110,8 @@ def find_rises(
             put_pieces(pieces, e, faces.edges[e, 0] == corner, faces, ahead)
             put_pieces(pieces, g, faces.edges[g, 0] == corner, faces, behind)
             turn = turns.cosine[face, c], turns.sine[face, c], turns.off[face, c]
-            worst = rise_across(faces, e, g, ahead, m, behind, n, turn, worst)
-            worst = rise_across(faces, g, e, behind, n, ahead, m, turn, worst)
+            worst = rise_across(faces, e, g, ahead, behind, (m, n), turn, worst)
+            worst = rise_across(faces, g, e, behind, ahead, (n, m), turn, worst)
         rises[face] = worst
 
 
@@ -145,18 +145,17 @@ def rise_across(
     e: int,
     g: int,
     of_e: Floats,
-    m: int,
     of_g: Floats,
-    n: int,
+    sizes: tuple[int, int],
     turn: tuple[float, float, float],
     worst: float,
 ) -> float:
     """Return the largest f(q) - f(p) - |pq| for p on e and q on g, or ``worst``.
 
-    They meet in a corner; see `verify.Pieces.across`. The first rows of the arrays are their
-    pieces.
+    They meet in a corner; see `verify.Pieces.across`. So many of the first rows of the arrays are
+    their pieces.
     """
-    cosine, sine, off = turn
+    (m, n), (cosine, sine, off) = sizes, turn
     length, is_alone = faces.length[e], faces.is_rim[e]
     beta, beta_g, near = extent_off(faces, e), extent_off(faces, g), 0
     bend = Cone(0.0, 0.0, 0.0, 0.0, math.inf, math.inf)

@@ -11,7 +11,7 @@ paths all the same, and off by a third to a half as much as without, at a third 
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from geodesic_core.kernels.costs.graph import (
     ALONG,
@@ -51,6 +51,46 @@ from geodesic_core.kernels.mesh.half_edges import (
     previous,
 )
 from geodesic_core.kernels.outcome import Outcome
+
+
+class Reached(NamedTuple):
+    """A node as a path leaves it over a face: at (x, 0), at height z, in the frame of an edge."""
+
+    node: int
+    value: float
+    x: float
+    z: float
+
+
+class Side(NamedTuple):
+    """A half-edge across a face, from its tail to its head, in the frame of another one."""
+
+    h: int
+    x0: float
+    y0: float
+    z0: float
+    x1: float
+    y1: float
+    z1: float
+
+
+class Bend(NamedTuple):
+    """A path over an edge, along x and as steep as ``tilt``, from (x0, y0) to (x1, y1).
+
+    In one face its cost is w0 times as high, in the other w1 times.
+    """
+
+    x0: float
+    y0: float
+    z0: float
+    x1: float
+    y1: float
+    z1: float
+    z_tail: float
+    tilt: float
+    w0: float
+    w1: float
+
 
 _ROUNDS = 3
 """Steps of Newton's method that move a crossing: more change no digit that counts."""
@@ -191,16 +231,16 @@ def open_vertex(graph: Any, front: Any, goal: Any, goal_faces: int, v: int) -> N
         step_along(graph, front, goal, v, value, h, 0.0, True)
         step_along(graph, front, goal, v, value, previous(h), 1.0, False)
         face = h // 3
-        factor = graph.factors[face]
-        if factor == math.inf:
+        if graph.factors[face] == math.inf:
             continue
         ax, ay = apex_of(graph, h)
         length = graph.geometry[ROW * h + LENGTH]
         links = ROW * h
         head, apex = graph.links[links + HEAD], graph.links[links + APEX]
-        cross(graph, front, goal, v, value, 0.0, z, face, factor, following(h), length, 0.0, ax, ay,
-              height(graph, head), height(graph, apex))  # fmt: skip
-        offer_goal(graph, front, goal, goal_faces, value, face, 0.0, z, h)
+        at = Reached(v, value, 0.0, z)
+        far = Side(following(h), length, 0.0, height(graph, head), ax, ay, height(graph, apex))
+        cross(graph, front, goal, at, far)
+        offer_goal(graph, front, goal, goal_faces, at, h)
 
 
 @kernel
@@ -218,17 +258,14 @@ def open_edge(graph: Any, front: Any, goal: Any, goal_faces: int, n: int) -> Non
         factor = graph.factors[face]
         if face != way and factor != math.inf and not (way == ALONG and factor == least):
             t = place if runs_up(graph, h) else 1.0 - place
-            open_face(graph, front, goal, goal_faces, n, value, h, t, face, factor)
+            open_face(graph, front, goal, goal_faces, n, h, t)
         h = next_of_edge(graph, h)
         if h < 0 or h == first:
             break
 
 
 @inlined
-def open_face(
-    graph: Any, front: Any, goal: Any, goal_faces: int, n: int, value: float, h: int, t: float,
-    face: int, factor: float,
-) -> None:  # fmt: skip
+def open_face(graph: Any, front: Any, goal: Any, goal_faces: int, n: int, h: int, t: float) -> None:
     """Offer the path over the point at share t of a half-edge to the nodes across its face."""
     row = ROW * h
     length = graph.geometry[row + LENGTH]
@@ -236,15 +273,13 @@ def open_face(
     ax, ay = apex_of(graph, h)
     tail, head, apex = graph.links[row + TAIL], graph.links[row + HEAD], graph.links[row + APEX]
     z_tail, z_head, z_apex = height(graph, tail), height(graph, head), height(graph, apex)
-    z = z_tail + t * (z_head - z_tail)
-    cross(graph, front, goal, n, value, x, z, face, factor, following(h), length, 0.0, ax, ay,
-          z_head, z_apex)  # fmt: skip
-    cross(graph, front, goal, n, value, x, z, face, factor, previous(h), ax, ay, 0.0, 0.0,
-          z_apex, z_tail)  # fmt: skip
-    dx = ax - x
-    cost = cost_of(graph.rule, dx * dx + ay * ay, z_apex - z)
-    offer(graph, front, goal, apex, value + factor * cost, n, face, shift_of(graph, n))
-    offer_goal(graph, front, goal, goal_faces, value, face, x, z, h)
+    at = Reached(n, front.values[n], x, z_tail + t * (z_head - z_tail))
+    cross(graph, front, goal, at, Side(following(h), length, 0.0, z_head, ax, ay, z_apex))
+    cross(graph, front, goal, at, Side(previous(h), ax, ay, z_apex, 0.0, 0.0, z_tail))
+    dx, face = ax - x, h // 3
+    cost = graph.factors[face] * cost_of(graph.rule, dx * dx + ay * ay, z_apex - at.z)
+    offer(graph, front, goal, apex, at.value + cost, n, face, shift_of(graph, n))
+    offer_goal(graph, front, goal, goal_faces, at, h)
 
 
 @inlined
@@ -254,26 +289,23 @@ def shift_of(graph: Any, n: int) -> float:
 
 
 @kernel
-def cross(
-    graph: Any, front: Any, goal: Any, n: int, value: float, x: float, z: float, face: int,
-    factor: float, h: int, x0: float, y0: float, x1: float, y1: float, z0: float, z1: float,
-) -> None:  # fmt: skip
-    """Offer the path over (x, 0), at height z, to the nodes of a half-edge from 0 to 1."""
-    e = graph.edge_of[h]
-    step = spacing(graph, e)
+def cross(graph: Any, front: Any, goal: Any, at: Reached, side: Side) -> None:
+    """Offer the path over a node to the nodes of a half-edge across the face."""
+    e, face = graph.edge_of[side.h], side.h // 3
+    factor, step = graph.factors[face], spacing(graph, e)
     first, end = graph.first_node[e], graph.first_node[e + 1]
     s = step
-    if not runs_up(graph, h):
+    if not runs_up(graph, side.h):
         s, step = 1.0 - step, -step
-    dx, dy, dz = x0 - x, y0, z0 - z
-    ex, ey, ez = x1 - x0, y1 - y0, z1 - z0
-    place = shift_of(graph, n)
+    dx, dy, dz = side.x0 - at.x, side.y0, side.z0 - at.z
+    ex, ey, ez = side.x1 - side.x0, side.y1 - side.y0, side.z1 - side.z0
+    place = shift_of(graph, at.node)
     front.counters[WORK] += end - first
     for m in range(first, end):
         rx, ry = dx + s * ex, dy + s * ey
-        cost = value + factor * cost_of(graph.rule, rx * rx + ry * ry, dz + s * ez)
+        cost = at.value + factor * cost_of(graph.rule, rx * rx + ry * ry, dz + s * ez)
         if cost < front.values[m]:
-            offer(graph, front, goal, m, cost, n, face, place)
+            offer(graph, front, goal, m, cost, at.node, face, place)
         s += step
 
 
@@ -304,21 +336,19 @@ def step_along(
 
 
 @inlined
-def offer_goal(
-    graph: Any, front: Any, goal: Any, goal_faces: int, value: float, face: int, x: float, z: float,
-    h: int,
-) -> None:  # fmt: skip
+def offer_goal(graph: Any, front: Any, goal: Any, goal_faces: int, at: Reached, h: int) -> None:
     """Lower the cost at the goal to that of the path over a node, where the face holds the goal.
 
-    The node is at (x, 0), at height z, in the frame of the face's half-edge h.
+    The node is in the frame of the face's half-edge h.
     """
+    face = h // 3
     for i in range(goal_faces):
         if goal.faces[i] == face:
             gx, gy, gz = corner_mix(graph, goal.weights, 3 * i, 3 * face)
             x0, y0, cosine, sine = frame_in_face(graph, h)
-            px, py = x0 + x * cosine, y0 + x * sine
+            px, py = x0 + at.x * cosine, y0 + at.x * sine
             square = (gx - px) * (gx - px) + (gy - py) * (gy - py)
-            cost = value + graph.factors[face] * cost_of(graph.rule, square, gz - z)
+            cost = at.value + graph.factors[face] * cost_of(graph.rule, square, gz - at.z)
             front.bounds[AT_GOAL] = min(front.bounds[AT_GOAL], cost)
 
 
@@ -382,7 +412,8 @@ def straighten_last(graph: Any, front: Any, starts: Any, n: int) -> None:
     tilt = (height(graph, graph.links[ROW * h + HEAD]) - z_tail) / length
     w0, w1 = graph.factors[before], graph.factors[face]
     x = node_place(graph, p) * length if up else (1.0 - node_place(graph, p)) * length
-    begin_cost = two_steps(graph, x, x0, y0, z0, x1, y1, z1, z_tail, tilt, w0, w1)
+    bend = Bend(x0, y0, z0, x1, y1, z1, z_tail, tilt, w0, w1)
+    begin_cost = two_steps(graph, x, bend)
     low, high = 0.0, length
     for _ in range(_ROUNDS if graph.rule.pieces == 0 else _ROUNDS_BY_SLOPE):
         first0, second0 = slopes(graph, x - x0, y0, z_tail + tilt * x - z0, tilt)
@@ -395,21 +426,19 @@ def straighten_last(graph: Any, front: Any, starts: Any, n: int) -> None:
         x = x - first / second if second > 0.0 else math.inf
         if not low <= x <= high:
             x = 0.5 * (low + high)
-    cost = two_steps(graph, x, x0, y0, z0, x1, y1, z1, z_tail, tilt, w0, w1)
+    cost = two_steps(graph, x, bend)
     if cost < begin_cost:
         front.values[n] -= begin_cost - cost
         front.shifts[n] = x / length if up else 1.0 - x / length
 
 
 @inlined
-def two_steps(
-    graph: Any, x: float, x0: float, y0: float, z0: float, x1: float, y1: float, z1: float,
-    z_tail: float, tilt: float, w0: float, w1: float,
-) -> float:  # fmt: skip
-    """Return the cost of a path over x on the edge, from (x0, y0) in one face to (x1, y1)."""
-    z, a, b = z_tail + tilt * x, x - x0, x1 - x
-    cost0 = cost_of(graph.rule, a * a + y0 * y0, z - z0)
-    return w0 * cost0 + w1 * cost_of(graph.rule, b * b + y1 * y1, z1 - z)
+def two_steps(graph: Any, x: float, bend: Bend) -> float:
+    """Return the cost of a path that crosses the edge at x."""
+    z, a, b = bend.z_tail + bend.tilt * x, x - bend.x0, bend.x1 - x
+    cost0 = cost_of(graph.rule, a * a + bend.y0 * bend.y0, z - bend.z0)
+    cost1 = cost_of(graph.rule, b * b + bend.y1 * bend.y1, bend.z1 - z)
+    return bend.w0 * cost0 + bend.w1 * cost1
 
 
 @inlined

@@ -37,6 +37,8 @@ from geodesic_core.kernels.mesh.half_edges import (
 )
 from geodesic_core.tolerances import PASSES, STALLS, STRAIGHT
 
+Place = tuple[float, float]
+
 # On which side of a strip a vertex is
 NEITHER = 0
 RIGHT = 1
@@ -575,7 +577,7 @@ def points_of(strip: Strip, string: String) -> tuple[Longs, Floats]:
         if k < len(string.bends):
             bend, column = string.bends[k], 0 if string.sides[k] == LEFT else 2
         bx, by = ends[bend, column], ends[bend, column + 1]
-        share = share_crossed(ax, ay, bx, by, x, y, lx, ly, rx, ry)
+        share = share_crossed((ax, ay), (bx, by), (x, y), (lx, ly), (rx, ry))
         x, y = lx + share * (rx - lx), ly + share * (ry - ly)
         if bend < size and ends[i, column] == bx and ends[i, column + 1] == by:
             share, x, y = column / 2.0, bx, by
@@ -588,14 +590,12 @@ def points_of(strip: Strip, string: String) -> tuple[Longs, Floats]:
 
 
 @inlined
-def share_crossed(
-    ax: float, ay: float, bx: float, by: float, x: float, y: float, lx: float, ly: float, rx: float,
-    ry: float,
-) -> float:  # fmt: skip
-    """Share of the portal from l to r at which the line from a to b crosses it.
+def share_crossed(a: Place, b: Place, come_to: Place, left_end: Place, right_end: Place) -> float:
+    """Share of the portal from its left to its right end at which the line from a to b crosses it.
 
-    Of a portal along the line it is the point nearest to (x, y), which the line has come to.
+    Of a portal along the line it is the point nearest to where the line has come to.
     """
+    (ax, ay), (bx, by), (x, y), (lx, ly), (rx, ry) = a, b, come_to, left_end, right_end
     left, right = area(ax, ay, bx, by, lx, ly), area(ax, ay, bx, by, rx, ry)
     dx, dy = rx - lx, ry - ly
     if left - right > 1e-14 * (abs(bx - ax) + abs(by - ay)) * (abs(dx) + abs(dy)):
