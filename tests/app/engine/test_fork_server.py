@@ -16,7 +16,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.file_slice(2)]
 
 WORK = [ROOT / "geodesic_core", ROOT / "app/encoding", ROOT / "app/queries"]
 NOT_FOR_WORKERS = {"nibabel", "vtkmodules", "zarr", "pyarrow", "pyvista", "PIL", "trimesh"}
-NOT_FOR_WORKERS |= {"ezdxf", "pydelatin", "pyproj", "rasterio", "shapely"}
+NOT_FOR_WORKERS |= {"ezdxf", "pydelatin", "pyogrio", "pyproj", "rasterio", "shapely"}
 """Packages for rare formats, maps and pictures, and VTK, which has processes of its own"""
 
 
