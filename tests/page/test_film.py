@@ -145,7 +145,7 @@ def frames_of(video: bytes) -> list[bytes]:
 def test_the_video_has_the_steps_of_the_film(view: View, service: str, tmp_path: Path) -> None:
     mesh = httpx2.post(f"{service}/v1/meshes?sample=plane&faces=8", timeout=LONG_S).json()["id"]
     show(view, mesh, 0)
-    view.page.select_option("#film-speed", "25")
+    view.page.select_option("#film-speed", "3")  # a busy browser leaves out what follows quickly
     with view.page.expect_download() as download:
         view.page.click("#film-save")
     download.value.save_as(tmp_path / "film.webm")
@@ -155,6 +155,5 @@ def test_the_video_has_the_steps_of_the_film(view: View, service: str, tmp_path:
     assert video[:4] == b"\x1a\x45\xdf\xa3"
     assert b"webm" in video[:64]
     assert re.search(rb"V_VP[89]", video)
-    # A busy browser leaves frames out, but not all between the first and the last.
-    assert len(set(frames_of(video))) >= 3
+    assert len(set(frames_of(video))) > 5
     view.wait()

@@ -62,30 +62,26 @@ class Reached(NamedTuple):
     z: float
 
 
+Place = tuple[float, float, float]
+"""x and y in the frame of a half-edge, and the height"""
+
+
 class Side(NamedTuple):
-    """A half-edge across a face, from its tail to its head, in the frame of another one."""
+    """A half-edge across a face, in the frame of another one."""
 
     h: int
-    x0: float
-    y0: float
-    z0: float
-    x1: float
-    y1: float
-    z1: float
+    tail: Place
+    head: Place
 
 
 class Bend(NamedTuple):
-    """A path over an edge, along x and as steep as ``tilt``, from (x0, y0) to (x1, y1).
+    """A path over an edge, which runs along x and is as steep as ``tilt``.
 
     In one face its cost is w0 times as high, in the other w1 times.
     """
 
-    x0: float
-    y0: float
-    z0: float
-    x1: float
-    y1: float
-    z1: float
+    start: Place
+    end: Place
     z_tail: float
     tilt: float
     w0: float
@@ -238,7 +234,7 @@ def open_vertex(graph: Any, front: Any, goal: Any, goal_faces: int, v: int) -> N
         links = ROW * h
         head, apex = graph.links[links + HEAD], graph.links[links + APEX]
         at = Reached(v, value, 0.0, z)
-        far = Side(following(h), length, 0.0, height(graph, head), ax, ay, height(graph, apex))
+        far = Side(following(h), (length, 0.0, height(graph, head)), (ax, ay, height(graph, apex)))
         cross(graph, front, goal, at, far)
         offer_goal(graph, front, goal, goal_faces, at, h)
 
@@ -274,8 +270,9 @@ def open_face(graph: Any, front: Any, goal: Any, goal_faces: int, n: int, h: int
     tail, head, apex = graph.links[row + TAIL], graph.links[row + HEAD], graph.links[row + APEX]
     z_tail, z_head, z_apex = height(graph, tail), height(graph, head), height(graph, apex)
     at = Reached(n, front.values[n], x, z_tail + t * (z_head - z_tail))
-    cross(graph, front, goal, at, Side(following(h), length, 0.0, z_head, ax, ay, z_apex))
-    cross(graph, front, goal, at, Side(previous(h), ax, ay, z_apex, 0.0, 0.0, z_tail))
+    far = (ax, ay, z_apex)
+    cross(graph, front, goal, at, Side(following(h), (length, 0.0, z_head), far))
+    cross(graph, front, goal, at, Side(previous(h), far, (0.0, 0.0, z_tail)))
     dx, face = ax - x, h // 3
     cost = graph.factors[face] * cost_of(graph.rule, dx * dx + ay * ay, z_apex - at.z)
     offer(graph, front, goal, apex, at.value + cost, n, face, shift_of(graph, n))
@@ -297,8 +294,9 @@ def cross(graph: Any, front: Any, goal: Any, at: Reached, side: Side) -> None:
     s = step
     if not runs_up(graph, side.h):
         s, step = 1.0 - step, -step
-    dx, dy, dz = side.x0 - at.x, side.y0, side.z0 - at.z
-    ex, ey, ez = side.x1 - side.x0, side.y1 - side.y0, side.z1 - side.z0
+    (x0, y0, z0), (x1, y1, z1) = side.tail, side.head
+    dx, dy, dz = x0 - at.x, y0, z0 - at.z
+    ex, ey, ez = x1 - x0, y1 - y0, z1 - z0
     place = shift_of(graph, at.node)
     front.counters[WORK] += end - first
     for m in range(first, end):
@@ -412,7 +410,7 @@ def straighten_last(graph: Any, front: Any, starts: Any, n: int) -> None:
     tilt = (height(graph, graph.links[ROW * h + HEAD]) - z_tail) / length
     w0, w1 = graph.factors[before], graph.factors[face]
     x = node_place(graph, p) * length if up else (1.0 - node_place(graph, p)) * length
-    bend = Bend(x0, y0, z0, x1, y1, z1, z_tail, tilt, w0, w1)
+    bend = Bend((x0, y0, z0), (x1, y1, z1), z_tail, tilt, w0, w1)
     begin_cost = two_steps(graph, x, bend)
     low, high = 0.0, length
     for _ in range(_ROUNDS if graph.rule.pieces == 0 else _ROUNDS_BY_SLOPE):
@@ -435,9 +433,10 @@ def straighten_last(graph: Any, front: Any, starts: Any, n: int) -> None:
 @inlined
 def two_steps(graph: Any, x: float, bend: Bend) -> float:
     """Return the cost of a path that crosses the edge at x."""
-    z, a, b = bend.z_tail + bend.tilt * x, x - bend.x0, bend.x1 - x
-    cost0 = cost_of(graph.rule, a * a + bend.y0 * bend.y0, z - bend.z0)
-    cost1 = cost_of(graph.rule, b * b + bend.y1 * bend.y1, bend.z1 - z)
+    (x0, y0, z0), (x1, y1, z1) = bend.start, bend.end
+    z, a, b = bend.z_tail + bend.tilt * x, x - x0, x1 - x
+    cost0 = cost_of(graph.rule, a * a + y0 * y0, z - z0)
+    cost1 = cost_of(graph.rule, b * b + y1 * y1, z1 - z)
     return bend.w0 * cost0 + bend.w1 * cost1
 
 
