@@ -1,6 +1,7 @@
 """Machines in network namespaces of their own, which a bridge connects: cables can be pulled.
 
-Needs root and iproute2. Machines share files, memory and the table of processes with this one.
+Needs root and iproute2. Machines share files and memory with this one, and the table of processes,
+of which their Python programs see their own.
 """
 
 import os
@@ -16,6 +17,7 @@ import psutil
 
 from tests.support.paths import ROOT
 
+_OWN_PROCESSES = ROOT / "tests" / "support" / "own_processes"
 OURS = 1
 """The last byte of our own address in a network; those of machines follow"""
 
@@ -67,7 +69,7 @@ class Machine:
         with log.open("ab") as output:
             return subprocess.Popen(  # noqa: S603 - ours
                 [*self.inside, *arguments],
-                env=os.environ | settings,
+                env=os.environ | settings | {"PYTHONPATH": str(_OWN_PROCESSES)},
                 cwd=ROOT,
                 stdout=output,
                 stderr=subprocess.STDOUT,
