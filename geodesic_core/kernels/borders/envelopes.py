@@ -79,9 +79,17 @@ def envelope_along(regions: Regions, edge: Any, length: float) -> Floats:
         lo, hi = span_between_sides(regions.rows[c], ox, oy, ux, uy, 0.0, length)
         if not lo < hi:
             continue
-        other = with_room(other, 4 * count + 8)
-        size = insert_region(stretches[:count], regions, c, (lo, hi), edge, length, other)
-        stretches, other, count = other, stretches, size
+        first = count - 1  # the stretches before it stay as they are
+        while first > 0 and stretches[first, START] >= lo:
+            first -= 1
+        other = with_room(other, 4 * (count - first) + 8)
+        rest = stretches[first:count]
+        size = insert_region(rest, regions, c, (lo, hi), edge, length, other)
+        count = first + size
+        stretches = with_room(stretches, count)
+        for k in range(size):
+            stretches[first + k, START] = other[k, START]
+            stretches[first + k, REGION] = other[k, REGION]
     return stretches[:count]
 
 
@@ -93,7 +101,7 @@ def insert_region(
     rows, labels, level = regions.rows, regions.labels, regions.level
     ox, oy, ux, uy = edge
     lo, hi = span
-    cuts, size = np.empty(6), 0
+    size = 0
     for k in range(len(stretches)):
         start, i = stretches[k, START], int(stretches[k, REGION])
         end = stretches[k + 1, START] if k + 1 < len(stretches) else length
@@ -103,17 +111,15 @@ def insert_region(
         a, b = max(lo, start), min(hi, end)
         if a > start:
             size = append_stretch(out, size, start, i)
-        cuts[0], number = a, 1
+        first, second = a, a
         if i >= 0:
             first, second = crossings_of(rows[c], rows[i], level, edge)
-            if a < first < b:
-                cuts[number] = first
-                number += 1
-            if a < second < b and second > first:
-                cuts[number] = second
-                number += 1
-        cuts[number] = b
-        for n in range(number):
+            first = first if a < first < b else a
+            second = second if first < second < b else first
+        cuts = (a, first, second, b)
+        for n in range(3):
+            if not cuts[n] < cuts[n + 1]:
+                continue
             t = 0.5 * (cuts[n] + cuts[n + 1])
             winner = c
             if i >= 0:

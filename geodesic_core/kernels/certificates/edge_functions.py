@@ -5,6 +5,7 @@ from any of its faces, is a cone between its ends. So is the way along the edge 
 it, or from a source on it, over its whole length.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,7 @@ from geodesic_core.kernels.jit import borrowed, inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL, Topology
 from geodesic_core.kernels.planar import distance
 from geodesic_core.kernels.retained.face_windows import FaceWindows
-from geodesic_core.tolerances import NARROW
+from geodesic_core.tolerances import HALF_ULP, NARROW
 
 # Columns of a cone
 FOOT = 0  # a
@@ -31,8 +32,8 @@ LOW = 3  # where it begins
 HIGH = 4  # and ends
 CONE = 5
 
-_CORRECTIONS = 4
-"""Newton steps by which the place where two cones cross is corrected"""
+_UP = 1.0 + 4.0 * HALF_ULP
+"""By rounding, a window may be above the cone of a vertex that it reaches"""
 
 
 class Sides(NamedTuple):
@@ -177,11 +178,9 @@ def with_pieces(cones: Floats, length: float, out: Floats, total: int) -> tuple[
     They begin and end at shares of the edge. Returns the array, which may be a larger one, and how
     many rows it has.
     """
-    number = len(cones)
-    regions, labels = np.zeros((number, SIDES_END)), np.zeros(number, np.int32)
-    for k in range(number):
-        put_cone(regions[k], cones[k])
-    stretches = envelope_along(Regions(regions, labels, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), length)
+    stretches = envelope_of_windows(cones, length)
+    if len(stretches) == 0:
+        stretches = envelope_of(cones, length)
     stretches = without_gaps(stretches, cones, length)
     out, start, before = with_room(out, total + len(stretches)), 0.0, -1
     for k in range(len(stretches)):
@@ -193,6 +192,42 @@ def with_pieces(cones: Floats, length: float, out: Floats, total: int) -> tuple[
         put_row(out[total], cones[cone, FOOT], cones[cone, HEIGHT], cones[cone, SIGMA], start, 1.0)
         total, before = total + 1, cone
     return out, total
+
+
+@kernel
+def envelope_of_windows(cones: Floats, length: float) -> Floats:
+    """Return the lower envelope where no cone of the edge's ends is part of it; else no stretch.
+
+    Along the edge no cone rises faster than those of the ends, which are above it so from any
+    place on where they are above it there.
+    """
+    stretches, count, near = envelope_of(cones[2:], length), 0, NARROW * length
+    for k in range(len(stretches)):
+        start, cone = stretches[k, START], int(stretches[k, REGION]) + 2
+        end = stretches[k + 1, START] if k + 1 < len(stretches) else length
+        if cone < 2:  # none, as in gaps by rounding
+            if end - start > near:
+                return stretches[:0]
+            continue
+        if cone_at(cones, cone, start) > (cones[0, SIGMA] + start) * _UP:
+            return stretches[:0]
+        if cone_at(cones, cone, end) > (cones[1, SIGMA] + length - end) * _UP:
+            return stretches[:0]
+        if count == 0 or stretches[count - 1, REGION] != cone:
+            stretches[count, START] = start if count > 0 else 0.0
+            stretches[count, REGION] = cone
+            count += 1
+    return stretches[:count]
+
+
+@kernel
+def envelope_of(cones: Floats, length: float) -> Floats:
+    """Return the lower envelope of cones, the region -1 where there is none; O(cones²)."""
+    number = len(cones)
+    regions, labels = np.zeros((number, SIDES_END)), np.zeros(number, np.int32)
+    for k in range(number):
+        put_cone(regions[k], cones[k])
+    return envelope_along(Regions(regions, labels, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), length)
 
 
 @inlined
@@ -216,14 +251,15 @@ def without_gaps(stretches: Floats, cones: Floats, length: float) -> Floats:
             long + 1 < total and stretches[long + 1, START] - stretches[k, START] < NARROW * length
         ):
             long += 1
-        before = int(stretches[count - 1, REGION])
-        start, end = stretches[k, START], stretches[long, START]
-        jumps, region = 0.0, before
-        for n in range(k, long + 1):
-            jumps += jump_at(cones, region, int(stretches[n, REGION]), stretches[n, START])
-            region = int(stretches[n, REGION])
-        if jumps > jump_at(cones, before, region, end) + 2.0 * (end - start):
-            k = long
+        before, region = int(stretches[count - 1, REGION]), int(stretches[long, REGION])
+        if k < long:
+            start, end = stretches[k, START], stretches[long, START]
+            jumps, last = 0.0, before
+            for n in range(k, long + 1):
+                jumps += jump_at(cones, last, int(stretches[n, REGION]), stretches[n, START])
+                last = int(stretches[n, REGION])
+            if jumps > jump_at(cones, before, region, end) + 2.0 * (end - start):
+                k = long
         if region != before or k < long:
             stretches[count, START] = stretches[k, START]
             stretches[count, REGION] = stretches[k, REGION]
@@ -241,30 +277,28 @@ def jump_at(cones: Floats, i: int, j: int, place: float) -> float:
 @kernel
 def crossing_near(cones: Floats, i: int, j: int, place: float, near: float) -> float:
     """Return the place no farther than ``near`` where two cones are equal, or nearly so."""
-    best, least = place, jump_at(cones, i, j, place)
-    lo, hi = place - near, place + near
-    for _ in range(_CORRECTIONS):
-        rate = slope_at(cones, i, place) - slope_at(cones, j, place)
-        if rate == 0.0:
+    best, least, lo, hi = place, math.inf, place - near, place + near
+    while lo <= place <= hi:
+        away = distance(place, cones[i, FOOT], cones[i, HEIGHT])
+        other = distance(place, cones[j, FOOT], cones[j, HEIGHT])
+        apart = cones[i, SIGMA] + away - (cones[j, SIGMA] + other)
+        if not abs(apart) < least:
             break
-        place -= (cone_at(cones, i, place) - cone_at(cones, j, place)) / rate
-        if not lo <= place <= hi:
+        best, least = place, abs(apart)
+        rate = slope(place - cones[i, FOOT], away) - slope(place - cones[j, FOOT], other)
+        if least == 0.0 or rate == 0.0:
             break
-        apart = jump_at(cones, i, j, place)
-        if not apart < least:
-            break
-        best, least = place, apart
+        place -= apart / rate
     return best
+
+
+@inlined
+def slope(along: float, away: float) -> float:
+    """Return the derivative of a cone, ``along`` from its foot; 0 at its apex."""
+    return along / away if away > 0.0 else 0.0
 
 
 @inlined
 def cone_at(cones: Floats, i: int, place: float) -> float:
     """Return the value of a cone."""
     return cones[i, SIGMA] + distance(place, cones[i, FOOT], cones[i, HEIGHT])
-
-
-@inlined
-def slope_at(cones: Floats, i: int, place: float) -> float:
-    """Return the derivative of a cone along the edge; 0 at its apex."""
-    away = distance(place, cones[i, FOOT], cones[i, HEIGHT])
-    return (place - cones[i, FOOT]) / away if away > 0.0 else 0.0
