@@ -78,7 +78,8 @@ def test_places_in_degrees_are_found(land: gc.terrain.Terrain) -> None:
 def test_without_a_crs_gpx_is_refused_and_geojson_is_told(
     plain: gc.terrain.Terrain, tmp_path: Path
 ) -> None:
-    lines = gc.exact_distance(plain.mesh, plain.locate_xy([20.0, 15.0])).isolines([3.0, 5.0])
+    field = gc.exact_distance(plain.mesh, plain.locate_xy([20.0, 15.0]), max_distance=6.0)
+    lines = field.isolines([3.0, 5.0])
     rings = [ring for (ring,) in lines]
     with pytest.raises(gc.errors.UnsuitableCrs, match="GPX is in WGS 84"):
         plain.save(tmp_path / "rings.gpx", rings)
@@ -122,11 +123,11 @@ def test_profiles_have_the_slopes_of_the_ground(
     assert way.cost == pytest.approx(float((pace * np.diff(profile.chainage)).sum()), rel=1e-9)
     x, y, _ = land.mesh.vertices.T
     tilted = gc.TriangleMesh(np.stack([x, y, 0.3 * x - 0.4 * y], axis=1), land.mesh.faces)
-    path = gc.shortest_path(tilted, 0, 1199)
+    path = gc.shortest_path(tilted, 0, 331)
     along = path.points[-1, :2] - path.points[0, :2]
     slope = along @ [0.3, -0.4] / np.hypot(*along)
     assert_allclose(path.profile().slopes, slope, rtol=1e-5)
-    ring = gc.exact_distance(tilted, 620).isolines([50.0])[0][0]
+    ring = gc.exact_distance(tilted, 620, max_distance=60.0).isolines([50.0])[0][0]
     round_trip = ring.profile()
     assert round_trip.ascent == pytest.approx(round_trip.descent)
     assert len(round_trip.heights) == len(ring.points) + 1
