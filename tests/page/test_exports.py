@@ -58,9 +58,12 @@ def test_downloads(view: View, knot: str, tmp_path: Path) -> None:
         assert offered == formats & written
 
 
-def test_the_view_as_svg_looks_as_the_picture(view: View, knot: str, tmp_path: Path) -> None:
-    """Lines and points are shapes; what the surface hides of them is hidden."""
-    view.open(f"/?mesh={knot}&source=v0&source=v700&target=v1000&shade=territories")
+@pytest.mark.parametrize("section", ["", "&section=x:0.6"])
+def test_the_view_as_svg_looks_as_the_picture(
+    view: View, knot: str, section: str, tmp_path: Path
+) -> None:
+    """Lines and points are shapes; what the surface or a section hides of them is hidden."""
+    view.open(f"/?mesh={knot}&source=v0&source=v700&target=v1000&shade=territories{section}")
     view.unfold("export")
     picture = pixels_of(saved(view, "#picture", tmp_path))
     svg = saved(view, "#svg", tmp_path)
@@ -71,7 +74,8 @@ def test_the_view_as_svg_looks_as_the_picture(view: View, knot: str, tmp_path: P
     assert kinds.count("image") == 1
     assert kinds.count("path") >= 4, "isolines or borders, and the path, with their casings"
     names = {element.text for element in tree.iter() if element.tag.endswith("text")}
-    assert names == set(view.page.locator("#point-labels span").all_inner_texts())
+    labels = view.page.locator("#point-labels span").all()
+    assert names == {label.inner_text() for label in labels if label.is_visible()}
 
     page = view.page.context.new_page()
     page.set_viewport_size({"width": width, "height": height})

@@ -237,6 +237,13 @@ def test_the_mesh_is_seen_from_usual_sides_in_section_and_flat(view: View, spher
     assert np.abs(view.colour(60, 60) - flat).max() < 3, "and this is as before"
     view.hover(60, -60)
     assert not view.page.is_visible("#where")
+    column, row = map(round, view.centre)
+    without = view.pixels()
+    view.page.select_option("#lines", "count")
+    view.wait()
+    differs = np.abs(view.pixels() - without).max(axis=2)[:, column - 100 : column + 100] > 8
+    assert differs[row : row + 100].any(), "lines on what is left"
+    assert not differs[row - 100 : row - 4].any(), "and none on what is not there"
 
     box = view.page.locator("#canvas").bounding_box()
     assert box is not None

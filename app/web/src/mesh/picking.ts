@@ -29,7 +29,7 @@ export function pick(
   return { face: hit.faceIndex, barycentric: weights(a!, b!, c!, hit.point) };
 }
 
-/** Whether nothing of the surface is between the camera and a drawn position of it. */
+/** Whether neither a section nor the surface before it hides a drawn position from the camera. */
 export function isSeen(
   tree: MeshBVH,
   camera: Camera,
@@ -37,7 +37,9 @@ export function isSeen(
   isHidden: IsHidden,
 ): boolean {
   const origin = new Vector3().setFromMatrixPosition(camera.matrixWorld);
-  const way = new Vector3(...position).sub(origin);
+  const place = new Vector3(...position);
+  if (isHidden(place)) return false;
+  const way = place.sub(origin);
   const hit = firstHit(tree, new Ray(origin, way.clone().normalize()), isHidden);
   return hit === null || hit.distance > way.length() - CLOSE;
 }

@@ -2,6 +2,7 @@
 import { BufferAttribute, BufferGeometry, Points, ShaderMaterial } from "three";
 import type { Rgb } from "./colours";
 import type { Stage } from "./scene";
+import { SECTION } from "./section";
 
 // Discs face the camera, slightly in front of their point, so that the surface does not cut them.
 const VERTEX = /* glsl */ `
@@ -10,10 +11,13 @@ const VERTEX = /* glsl */ `
   uniform float ratio;
   varying vec3 v_fill;
   varying float v_size;
+  #include <clipping_planes_pars_vertex>
   void main() {
     v_fill = fill;
     v_size = size * ratio;
-    vec4 eye = modelViewMatrix * vec4(position, 1.0);
+    vec4 mvPosition = modelViewMatrix * vec4(position, 1.0);
+    #include <clipping_planes_vertex>
+    vec4 eye = mvPosition;
     eye.xyz *= 1.0 - 0.02 / max(length(eye.xyz), 0.05);
     gl_Position = projectionMatrix * eye;
     gl_PointSize = v_size;
@@ -24,7 +28,9 @@ const FRAGMENT = /* glsl */ `
   uniform float opacity;
   varying vec3 v_fill;
   varying float v_size;
+  #include <clipping_planes_pars_fragment>
   void main() {
+    #include <clipping_planes_fragment>
     float away = length(gl_PointCoord - 0.5) * v_size;
     float rim = 0.5 * v_size - away;
     vec3 colour = mix(vec3(1.0), v_fill, smoothstep(2.2 * ratio, 3.2 * ratio, rim));
@@ -97,6 +103,8 @@ export class Markers {
       vertexShader: VERTEX,
       fragmentShader: FRAGMENT,
       transparent: true,
+      clipping: true,
+      clippingPlanes: depthTest ? SECTION : [],
       depthTest,
       depthWrite: false,
     });

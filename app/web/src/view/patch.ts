@@ -2,6 +2,7 @@
 import { BufferAttribute, BufferGeometry, DoubleSide, Mesh, MeshBasicMaterial } from "three";
 import type { LoadedMesh } from "../mesh/loader";
 import type { Stage } from "./scene";
+import { SECTION } from "./section";
 
 export class Patch {
   private readonly object: Mesh<BufferGeometry, MeshBasicMaterial>;
@@ -20,6 +21,7 @@ export class Patch {
       polygonOffset: true,
       polygonOffsetFactor: 0,
       polygonOffsetUnits: -200,
+      clippingPlanes: SECTION,
     });
     this.object = new Mesh(new BufferGeometry(), material);
     this.object.renderOrder = 1;

@@ -9,6 +9,7 @@ import {
   Vector2,
   type WebGLRenderer,
 } from "three";
+import { SECTION } from "./section";
 import { simplified, type Triple } from "./simplified";
 
 // Two vertices for each point, aside of the line, so that neighbouring segments share an edge and do
@@ -21,6 +22,7 @@ const VERTEX = /* glsl */ `
   uniform float width;
   uniform float before;
   varying float away;
+  #include <clipping_planes_pars_vertex>
 
   const float NEAR = 0.01;
 
@@ -50,6 +52,8 @@ const VERTEX = /* glsl */ `
     clip.xy += 2.0 * mitre * vec2(-along.y, along.x) / resolution * clip.w;
     clip.z -= before * clip.w; // so that the surface does not cut it
     gl_Position = clip;
+    vec4 mvPosition = modelViewMatrix * vec4(position, 1.0);
+    #include <clipping_planes_vertex>
   }`;
 
 const FRAGMENT = /* glsl */ `
@@ -59,7 +63,9 @@ const FRAGMENT = /* glsl */ `
   uniform float inner;
   uniform float width;
   varying float away;
+  #include <clipping_planes_pars_fragment>
   void main() {
+    #include <clipping_planes_fragment>
     float line = clamp(0.5 * inner - abs(away) + 0.5, 0.0, 1.0);
     float all = clamp(0.5 * width - abs(away) + 0.5, 0.0, 1.0);
     gl_FragColor = vec4(mix(casing, colour, line), opacity * all);
@@ -95,6 +101,8 @@ export function ribbonMesh(look: Look): Mesh {
     fragmentShader: FRAGMENT,
     transparent: true,
     side: DoubleSide,
+    clipping: true,
+    clippingPlanes: before === null ? [] : SECTION,
     depthTest: before !== null,
     depthWrite: false,
   });

@@ -6,6 +6,7 @@ import {
   MOUSE,
   type Object3D,
   PerspectiveCamera,
+  type Plane,
   type Points,
   Scene,
   Spherical,
@@ -16,6 +17,7 @@ import {
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { Backdrop } from "./backdrop";
 import { Compass } from "./compass";
+import { SECTION } from "./section";
 
 ColorManagement.enabled = false; // colours are given in sRGB, as displayed
 
@@ -60,6 +62,7 @@ export class Stage {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
     this.renderer.autoClear = false;
+    this.renderer.localClippingEnabled = true;
     this.backdrop = new Backdrop(this.renderer);
     this.renderer.debug.checkShaderErrors = false; // asking would wait for the compiler
     this.compass = new Compass(this.camera, canvas);
@@ -257,6 +260,12 @@ export class Stage {
     this.camera.fov = (Math.atan(slope) * 360) / Math.PI;
     this.camera.updateProjectionMatrix();
     if (this.whole) this.lookAtAll(this.whole);
+    this.invalidate();
+  }
+
+  /** Draw only what is on the positive side of a plane, where there is one. */
+  setSection(plane: Plane | null): void {
+    SECTION.splice(0, 1, ...(plane ? [plane] : []));
     this.invalidate();
   }
 

@@ -10,7 +10,7 @@ import type {
   PathAnswer,
   StraightLine,
 } from "geodesic-client";
-import { Mesh, PlaneGeometry, Vector3 } from "three";
+import { Plane as CuttingPlane, Mesh, PlaneGeometry, Vector3 } from "three";
 import { MeshBVH } from "three-mesh-bvh";
 import { written } from "../dom";
 import { frontOf, type Up } from "../mesh/frame";
@@ -178,10 +178,9 @@ export class SceneView {
     const { mesh, surface } = this;
     if (!mesh || !surface) return;
     surface.setLit(!flat);
-    const [normal, out] = section ? planeOf(mesh, section) : [new Vector3(), 1];
-    surface.setSection(normal.toArray(), out);
-    this.isHidden = section ? (position) => normal.dot(position) > out : () => false;
-    this.stage.invalidate();
+    const plane = section && planeOf(mesh, section);
+    this.stage.setSection(plane);
+    this.isHidden = (position) => plane !== null && plane.distanceToPoint(position) < 0;
   }
 
   /** Show the whole mesh, from where the points can be seen if there are any. */
@@ -303,8 +302,8 @@ export class SceneView {
   }
 }
 
-/** Return the normal of a section in drawn positions, and how far out it is. */
-function planeOf(mesh: LoadedMesh, { axis, share }: Section): [Vector3, number] {
+/** Return the plane of a section in drawn positions; its positive side is what is left. */
+function planeOf(mesh: LoadedMesh, { axis, share }: Section): CuttingPlane {
   const [low, high] = mesh.document.bounds ?? [
     [0, 0, 0],
     [0, 0, 0],
@@ -313,6 +312,9 @@ function planeOf(mesh: LoadedMesh, { axis, share }: Section): [Vector3, number] 
   const ends = [low, high].map((corner) => new Vector3(...mesh.drawn(corner)));
   const [from = new Vector3(), to = new Vector3()] = ends;
   const along = low.map((x, i) => (i === at ? (high[i] ?? x) : x));
-  const normal = new Vector3(...mesh.drawn(along)).sub(from).normalize();
-  return [normal, from.dot(normal) + share * to.sub(from).dot(normal)];
+  const inwards = from
+    .clone()
+    .sub(new Vector3(...mesh.drawn(along)))
+    .normalize();
+  return new CuttingPlane().setFromNormalAndCoplanarPoint(inwards, from.lerp(to, share));
 }

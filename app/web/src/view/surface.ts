@@ -11,12 +11,11 @@ import {
   Mesh,
   RGBAFormat,
   ShaderMaterial,
-  Vector4,
 } from "three";
-import type { Triple } from "../mesh/frame";
 import type { LoadedMesh } from "../mesh/loader";
 import { INITIAL, type Palette } from "../state/state";
 import { type Rgb, ramp, territory } from "./colours";
+import { SECTION } from "./section";
 
 const VERTEX = /* glsl */ `
   attribute float value;
@@ -25,15 +24,15 @@ const VERTEX = /* glsl */ `
   varying vec3 v_tint;
   varying vec3 v_normal;
   varying vec3 v_eye;
-  varying vec3 v_place;
+  #include <clipping_planes_pars_vertex>
   void main() {
-    v_place = position;
     v_value = value;
     v_tint = tint;
     v_normal = normalMatrix * normal;
-    vec4 eye = modelViewMatrix * vec4(position, 1.0);
-    v_eye = eye.xyz;
-    gl_Position = projectionMatrix * eye;
+    vec4 mvPosition = modelViewMatrix * vec4(position, 1.0); // as three's chunks call it
+    v_eye = mvPosition.xyz;
+    gl_Position = projectionMatrix * mvPosition;
+    #include <clipping_planes_vertex>
   }`;
 
 // Values are shares of the range of colours; far below it means unreached: one such vertex turns its
@@ -47,11 +46,10 @@ const FRAGMENT = /* glsl */ `
   varying vec3 v_tint;
   varying vec3 v_normal;
   varying vec3 v_eye;
-  varying vec3 v_place;
-  uniform vec4 section;
   uniform float lit;
+  #include <clipping_planes_pars_fragment>
   void main() {
-    if (dot(v_place, section.xyz) > section.w) discard;
+    #include <clipping_planes_fragment>
     vec3 colour = clay;
     if (v_value > UNREACHED) {
       float share = clamp(v_value, 0.0, 1.0);
@@ -83,10 +81,11 @@ export function surfacePaint(): ShaderMaterial {
       tinted: { value: 0 },
       clay: { value: CLAY },
       lit: { value: 1 },
-      section: { value: new Vector4(0, 0, 0, 1) },
     },
     vertexShader: VERTEX,
     fragmentShader: FRAGMENT,
+    clipping: true,
+    clippingPlanes: SECTION,
     side: DoubleSide,
     // Objects on the surface are drawn in front of it.
     polygonOffset: true,
@@ -102,6 +101,8 @@ export function inFront(paint: ShaderMaterial): ShaderMaterial {
     uniforms,
     vertexShader: VERTEX,
     fragmentShader: FRAGMENT,
+    clipping: true,
+    clippingPlanes: SECTION,
     side: DoubleSide,
   });
 }
@@ -164,11 +165,6 @@ export class Surface {
     this.uniform("lit").value = isLit ? 1 : 0;
   }
 
-  /** Hide what is beyond a plane of drawn positions, given by its normal and how far it is out. */
-  setSection([x, y, z]: Triple, out: number): void {
-    (this.uniform("section").value as Vector4).set(x, y, z, out);
-  }
-
   /** Draw what the mesh shows now: the surface, or its plane. */
   reshape(): void {
     const { shown } = this.mesh;
@@ -190,7 +186,11 @@ export class Surface {
       const geometry = new BufferGeometry();
       geometry.setAttribute("position", this.mesh.geometry.getAttribute("position"));
       geometry.setIndex(new BufferAttribute(edges, 1));
-      const material = new LineBasicMaterial({ transparent: true, opacity: 0.35 });
+      const material = new LineBasicMaterial({
+        transparent: true,
+        opacity: 0.35,
+        clippingPlanes: SECTION,
+      });
       this.wires = new LineSegments(geometry, material);
       this.object.add(this.wires);
     }

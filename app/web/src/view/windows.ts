@@ -12,6 +12,7 @@ import {
 import type { LoadedMesh } from "../mesh/loader";
 import type { Rgb } from "./colours";
 import type { Stage } from "./scene";
+import { SECTION } from "./section";
 
 /** Steps in which a trimmed window fades. */
 const FADING = 6;
@@ -36,6 +37,7 @@ const VERTEX = /* glsl */ `
   uniform float step;
   varying vec4 v_colour;
   varying vec2 v_corner;
+  #include <clipping_planes_pars_vertex>
 
   void main() {
     bool waits = life.y > step;
@@ -47,7 +49,9 @@ const VERTEX = /* glsl */ `
     }
     float depth = DEPTH * (isThere && !waits ? 0.55 : 1.0);
     vec3 place = mix(mix(start, end, corner.x), centre, depth * corner.y);
-    vec4 clip = projectionMatrix * modelViewMatrix * vec4(place, 1.0);
+    vec4 mvPosition = modelViewMatrix * vec4(place, 1.0);
+    #include <clipping_planes_vertex>
+    vec4 clip = projectionMatrix * mvPosition;
     clip.z -= (isThere ? waits ? 4e-4 : 2e-4 : 6e-4) * clip.w;
     gl_Position = clip;
     v_corner = corner;
@@ -60,7 +64,9 @@ const VERTEX = /* glsl */ `
 const FRAGMENT = /* glsl */ `
   varying vec4 v_colour;
   varying vec2 v_corner;
+  #include <clipping_planes_pars_fragment>
   void main() {
+    #include <clipping_planes_fragment>
     // A dark line at both ends sets apart the windows of one pseudosource.
     float away = min(v_corner.x, 1.0 - v_corner.x) / max(fwidth(v_corner.x), 1e-6);
     float line = 1.0 - clamp(away, 0.0, 1.0);
@@ -85,6 +91,8 @@ export class WindowLayer {
       uniforms: { step: { value: 0 } },
       vertexShader: VERTEX,
       fragmentShader: FRAGMENT,
+      clipping: true,
+      clippingPlanes: SECTION,
       transparent: true,
       depthWrite: false,
       side: DoubleSide,
