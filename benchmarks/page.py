@@ -58,7 +58,7 @@ _FOLLOW = """async places => {
     for (const [clientX, clientY] of places) {
         const before = readout.dataset.target;
         canvas.dispatchEvent(new PointerEvent('pointermove', {
-            clientX, clientY, altKey: true, pointerId: 1, bubbles: true
+            clientX, clientY, pointerId: 1, bubbles: true
         }));
         while (root.dataset.state !== 'ready') await tick();  // each is drawn in a frame of its own
         answered += readout.dataset.target !== before;
@@ -169,8 +169,9 @@ def _follow(page: Page, address: str, body: bytes) -> float:
         range(int(inside.sum())), TARGETS + 1
     )
     places = np.column_stack([columns[inside], rows[inside]])[chosen].tolist()
-    page.keyboard.down("Alt")
-    page.mouse.move(*places[0])
+    page.mouse.click(*places[0])  # the target, which a drag from there moves
+    page.wait_for_selector("#readout:visible")
+    page.wait_for_selector("html[data-state=ready]")
     page.mouse.down()
     followed = page.evaluate(_FOLLOW, places[1:])
     page.mouse.up()
