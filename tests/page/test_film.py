@@ -19,8 +19,6 @@ pytestmark = pytest.mark.file_slice(5)
 FRONT = np.array([255, 204, 26])
 STEPS = 240
 SEGMENT, CLUSTER, GROUP, BLOCK, SIMPLE_BLOCK = 0x18538067, 0x1F43B675, 0xA0, 0xA1, 0xA3
-
-
 _NOTE_WORDS = """() => {
     const place = document.getElementById('film-words');
     window.told = [];
@@ -31,6 +29,10 @@ _NOTE_WORDS = """() => {
 
 def show(view: View, mesh: str, source: int) -> None:
     view.open(f"/?mesh={mesh}&source=v{source}")
+    begin(view)
+
+
+def begin(view: View) -> None:
     view.page.click("#film > summary")
     view.page.select_option("#film-speed", "3")  # a busy browser leaves out what follows quickly
     view.page.evaluate(_NOTE_WORDS)
@@ -109,11 +111,7 @@ def test_it_lies_below_the_mesh_on_a_phone(view: View, service: str) -> None:
     view.page.set_viewport_size({"width": 360, "height": 640})
     view.open(f"/?mesh={sample(service, 'terrain', 200)}&source=v0")
     view.page.click("#fold")
-    view.page.click("#film > summary")
-    view.page.select_option("#film-speed", "3")  # a busy browser leaves out what follows quickly
-    view.page.evaluate(_NOTE_WORDS)
-    view.page.click("#film-start")
-    view.page.locator("#player").wait_for()
+    begin(view)
     view.wait()
     boxes = [view.page.locator(each).bounding_box() for each in ("#canvas", "#player", "#panel")]
     canvas, player, panel = (box for box in boxes if box is not None)

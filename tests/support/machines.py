@@ -1,7 +1,7 @@
 """Machines in network namespaces of their own, which a bridge connects: cables can be pulled.
 
-Needs root and iproute2. Machines share files and memory with this one, and the table of processes,
-of which their Python programs see their own.
+Needs root and iproute2. Machines share files, memory and the table of processes with this one;
+their Python programs see only their own processes.
 """
 
 import os

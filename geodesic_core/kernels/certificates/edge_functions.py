@@ -32,6 +32,8 @@ LOW = 3  # where it begins
 HIGH = 4  # and ends
 CONE = 5
 
+_CORRECTIONS = 4
+"""Newton steps by which the place where two cones cross is corrected"""
 _UP = 1.0 + 4.0 * HALF_ULP
 """By rounding, a window may be above the cone of a vertex that it reaches"""
 
@@ -196,10 +198,10 @@ def with_pieces(cones: Floats, length: float, out: Floats, total: int) -> tuple[
 
 @kernel
 def envelope_of_windows(cones: Floats, length: float) -> Floats:
-    """Return the lower envelope where no cone of the edge's ends is part of it; else no stretch.
+    """Return the lower envelope of the windows, or none where the cone of an end is below it.
 
-    Along the edge no cone rises faster than those of the ends, which are above it so from any
-    place on where they are above it there.
+    No cone rises faster along the edge than those of the ends. So these are above all of a stretch
+    if that from the lower end is above its start, and that from the upper end above its end.
     """
     stretches, count, near = envelope_of(cones[2:], length), 0, NARROW * length
     for k in range(len(stretches)):
@@ -278,7 +280,9 @@ def jump_at(cones: Floats, i: int, j: int, place: float) -> float:
 def crossing_near(cones: Floats, i: int, j: int, place: float, near: float) -> float:
     """Return the place no farther than ``near`` where two cones are equal, or nearly so."""
     best, least, lo, hi = place, math.inf, place - near, place + near
-    while lo <= place <= hi:
+    for _ in range(_CORRECTIONS + 1):
+        if not lo <= place <= hi:
+            break
         away = distance(place, cones[i, FOOT], cones[i, HEIGHT])
         other = distance(place, cones[j, FOOT], cones[j, HEIGHT])
         apart = cones[i, SIGMA] + away - (cones[j, SIGMA] + other)

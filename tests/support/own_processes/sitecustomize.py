@@ -1,4 +1,4 @@
-"""Hide the processes of other machines, which share one table: Ray looks there for its own.
+"""Hide the processes of other machines: all share one table, in which Ray looks for its own.
 
 Python imports this when it starts on a machine of ``tests.support.machines``.
 """
