@@ -173,7 +173,7 @@ def test_a_wrong_start_leaves_no_answer(view: View, sphere: str, text: str, word
         ("#points", "v0 > v99999999 > v900", "Invalid point"),
         ("#points", "v0 > v1,v2 > v900", "Not a point"),
         ("#barriers", "99999999", "Invalid request"),
-        ("#barriers", "3;4", "Not a range of faces"),
+        ("#barriers", "3:4", "Not a range of faces"),
         ("#barriers", "7-6", "Not a range of faces"),
         ("#barriers", "0-99999999999", "Not a range of faces"),
     ],

@@ -515,6 +515,20 @@ def test_waypoints_and_barriers(view: View, sphere: str) -> None:
     around = length_of(view)
     assert around > straight * 1.05
 
+    # A stroke that crosses the wall is a barrier of its own.
+    view.drag((-40, 30), (40, 30), steps=2)
+    assert len(view.page.locator("#places .barrier").all()) == 2
+    assert len(seen(view, BARRIER, 20)) > len(wall)
+    view.page.click("#places >> [aria-label^='Remove Barrier 2 ']")
+    view.wait()
+    assert len(seen(view, BARRIER, 20)) == len(wall)
+    assert length_of(view) == around
+    view.page.click("#undo")
+    view.wait()
+    assert len(query_of(view)["barriers"]) == 2
+    view.page.click("#undo")
+    view.wait()
+
     view.page.click("#tools >> text=Stop")
     view.click(0, 150)
     assert length_of(view) > around

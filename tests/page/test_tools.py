@@ -9,13 +9,28 @@ from typing import Any
 import httpx2
 import numpy as np
 import pytest
+import trimesh
 from numpy.typing import NDArray
 from playwright.sync_api import FilePayload
 
 from tests.page.conftest import sample
+from tests.page.test_exports import saved
+from tests.page.test_page import seen
 from tests.support.viewing import PLAIN, View, length_of, query_of
 
 pytestmark = pytest.mark.file_slice(4)
+
+HUES = np.array(  # of Okabe and Ito
+    [
+        [230, 159, 0],
+        [86, 180, 233],
+        [0, 158, 115],
+        [240, 228, 66],
+        [0, 114, 178],
+        [213, 94, 0],
+        [204, 121, 167],
+    ]
+)
 
 
 def asked(service: str, mesh: str, operation: str, **body: Any) -> dict[str, Any]:
@@ -63,9 +78,10 @@ def test_points_are_spread_and_their_cells_have_areas(view: View, service: str) 
 
 
 def test_the_mesh_is_cut_along_isolines_and_this_is_undone(
-    view: View, service: str, sphere: str
+    view: View, service: str, sphere: str, tmp_path: Path
 ) -> None:
-    view.open(f"/?mesh={sphere}&source=v0&target=v900&lines=count:2&{PLAIN.split('&')[1]}")
+    plain = f"lines=count:2&flat=1&{PLAIN.split('&')[1]}"
+    view.open(f"/?mesh={sphere}&source=v0&target=v900&{plain}")
     before = view.text("#length")
     view.unfold("more-shape")
     view.page.uncheck("#cut-path")
@@ -83,6 +99,15 @@ def test_the_mesh_is_cut_along_isolines_and_this_is_undone(
     assert (report["components"], report["boundary_loops"]) == (3, 4)
     assert "3 pieces, with 4 boundaries" in view.text("#report")
     assert query_of(view)["boundary"] == ["1"]
+
+    counts = [len(seen(view, np.minimum(1.06 * hue, 255), 3)) for hue in HUES]
+    assert min(counts[:3]) > 100, "each piece has its colour"
+    assert max(counts[3:]) == 0
+    view.unfold("export")
+    drawn = trimesh.load_mesh(saved(view, "#obj", tmp_path), process=False)
+    for name in ("vertices", "faces"):
+        array = httpx2.get(f"{service}/v1/meshes/{cut_mesh}/arrays/{name}")
+        assert np.array_equal(getattr(drawn, name), np.load(BytesIO(array.content)))
 
     view.page.click("#undo")
     view.wait()

@@ -1,4 +1,5 @@
 // The page's parts and their wiring: users change the state, and every part follows it.
+
 import type { About, MeshDocument, PathAnswer } from "geodesic-client";
 import { Borders } from "./ask/borders";
 import { Boundaries } from "./ask/boundaries";
@@ -25,6 +26,7 @@ import { ProfileChart } from "./panel/profile";
 import { Regions } from "./panel/regions";
 import { showReport } from "./panel/report";
 import { service } from "./service";
+import { blockedFaces } from "./state/barriers";
 import { readSample, readState, writeState } from "./state/permalink";
 import { type State, Store, unitOf, withMesh } from "./state/state";
 import { Status } from "./status";
@@ -203,10 +205,11 @@ function isUnrolled(state: State, before: State): boolean {
   return asked(state) !== asked(before);
 }
 
-function unrollingOf({ places, barriers, maxDistance }: State) {
+function unrollingOf(state: State) {
+  const { places, maxDistance } = state;
   const [first] = places;
   if (!first) return null;
-  return { source: first.point, barriers, maxDistance };
+  return { source: first.point, barriers: blockedFaces(state), maxDistance };
 }
 
 /** Load a mesh, and draw on it the answers that have arrived by then. */

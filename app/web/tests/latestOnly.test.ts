@@ -53,24 +53,30 @@ test("of those that wait only the latest is answered", async () => {
   expect(server.log).toEqual(["answered 1", "answered 4"]);
 });
 
-test("what only refines an answer is aborted at once, and not begun for an old request", async () => {
+test("an answer is refined once requests rest, and for no old one", async () => {
   const log: string[] = [];
   const latestOnly = new LatestOnly<number>(async (request, { signal }) => {
     log.push(`answered ${request}`);
-    if (!latestOnly.refines()) return;
+    if (!(await latestOnly.rests())) return;
+    log.push(`refines ${request}`);
     await new Promise((resolve, reject) => {
       setTimeout(resolve, 1000);
       signal.addEventListener("abort", () => reject(signal.reason));
     });
     log.push(`refined ${request}`);
   }, vi.fn());
-  latestOnly.ask(1);
-  await vi.advanceTimersByTimeAsync(10);
-  latestOnly.ask(2);
+  for (const request of [1, 2, 3]) {
+    latestOnly.ask(request);
+    await vi.advanceTimersByTimeAsync(50);
+  }
+  expect(log, "a pointer that moves").toEqual(["answered 1", "answered 2", "answered 3"]);
+  await vi.advanceTimersByTimeAsync(50);
+  expect(log.at(-1)).toBe("refines 3");
+  latestOnly.ask(4); // aborts what refines 3, without patience
   await vi.advanceTimersByTimeAsync(1);
-  expect(log).toEqual(["answered 1", "answered 2"]);
+  expect(log.slice(4)).toEqual(["answered 4"]);
   await vi.runAllTimersAsync();
-  expect(log).toEqual(["answered 1", "answered 2", "refined 2"]);
+  expect(log.slice(5)).toEqual(["refines 4", "refined 4"]);
 });
 
 test("a superseded request is aborted after 100 ms, and not before", async () => {

@@ -56,9 +56,12 @@ describe("paths", () => {
     barriers: [7],
   };
 
-  async function outlinesOf(question: RouteQuestion, refines = () => true): Promise<PathAnswer[]> {
+  async function outlinesOf(
+    question: RouteQuestion,
+    rests = async () => true,
+  ): Promise<PathAnswer[]> {
     const outlines = [];
-    for await (const outline of askRoute("m", question, signal, refines)) outlines.push(outline);
+    for await (const outline of askRoute("m", question, signal, rests)) outlines.push(outline);
     return outlines;
   }
 
@@ -81,7 +84,7 @@ describe("paths", () => {
     fakeService({ "POST /v1/meshes/m/path": () => json({ length: 3 }) });
     const question = { ...route, sources: route.sources.slice(0, 1) };
 
-    expect(await outlinesOf(question, () => false)).toEqual([{ length: 3 }]);
+    expect(await outlinesOf(question, async () => false)).toEqual([{ length: 3 }]);
   });
 
   test.each([
@@ -93,7 +96,7 @@ describe("paths", () => {
       "POST /v1/meshes/m/path": () => json({ length: 2 }),
     });
     const { sources, ...rest } = { ...route, waypoints };
-    const [outline] = await outlinesOf({ sources, ...rest }, () => false);
+    const [outline] = await outlinesOf({ sources, ...rest }, async () => false);
     expect(outline).toEqual({ length: 2 });
 
     expect(requests.map(({ body }) => body)).toEqual([
@@ -159,7 +162,7 @@ describe("the question of a state", () => {
       method: "fast",
       effort: 4,
     });
-    expect(questionOf({ ...state, maxDistance: 2, barriers: [3] }, "exact")).toEqual({
+    expect(questionOf({ ...state, maxDistance: 2, barriers: [[3]] }, "exact")).toEqual({
       sources: [{ vertex: 1 }],
       method: "exact",
       maxDistance: 2,

@@ -44,7 +44,7 @@ test("with a target the path from the source in question is asked for", () => {
     ...STATE,
     places: placesAt(SOURCE, { vertex: 5 }, { vertex: 9 }),
     starts: 1,
-    barriers: [7],
+    barriers: [[7]],
   };
   const body = { source: SOURCE, target: { vertex: 9 }, waypoints: [{ vertex: 5 }], barriers: [7] };
   const curl = curlOf(state, SOURCE, HOST, false);

@@ -64,7 +64,7 @@ test("a new mesh takes along the settings and none of the points", () => {
     mesh: "old",
     places: placesAt({ vertex: 1 }, { vertex: 2 }, { vertex: 3 }),
     starts: 2,
-    barriers: [4],
+    barriers: [[4]],
     maxDistance: 5,
     view: [0, 1, 2, 0, 0, 0],
     method: "approximate",
@@ -103,7 +103,7 @@ test("what cannot be read is no question until there is another one", () => {
   store.update({ isReadable: false });
   store.update({ wireframe: true, view: null });
   expect(store.state.isReadable).toBe(false);
-  for (const change of [{ places: [] }, { starts: 1 }, { barriers: [1] }, { mesh: "m" }]) {
+  for (const change of [{ places: [] }, { starts: 1 }, { barriers: [[1]] }, { mesh: "m" }]) {
     store.update({ isReadable: false });
     store.update(change);
     expect(store.state.isReadable).toBe(true);
@@ -119,7 +119,7 @@ describe("undo", () => {
     const changes = [
       { mesh: "m" },
       { places: placesAt({ vertex: 1 }) },
-      { barriers: [4] },
+      { barriers: [[4]] },
       { palette: "magma" as const },
       { distances: false },
       { mesh: "other", places: [] },
@@ -178,7 +178,7 @@ describe("undo", () => {
     const store = new Store();
     const view = [0, 1, 2, 0, 0, 0];
     store.update({ mesh: "m" });
-    store.update({ barriers: [4] });
+    store.update({ barriers: [[4]] });
     store.replace({ view, up: "y" });
     store.undo();
     expect(store.state).toMatchObject({ barriers: [], view, up: "y" });

@@ -1,4 +1,5 @@
 // Distances to all vertices: requested when sources, method or limits change, then painted.
+
 import type {
   Call,
   Certificate,
@@ -14,6 +15,7 @@ import type { FacePoint } from "../mesh/picking";
 import { extremesOf } from "../mesh/values";
 import type { Notes } from "../panel/notes";
 import { service } from "../service";
+import { blockedFaces } from "../state/barriers";
 import { nameOf, startsOf } from "../state/places";
 import { INITIAL, type Shade, type State, unitOf } from "../state/state";
 import { PATIENCE_MS, type Status } from "../status";
@@ -160,7 +162,7 @@ export class Fields {
           await service.distances(asked.mesh, sources, { ...question, ...call }),
         );
         this.show(answers, asked);
-        if (!this.latestOnly.refines()) return;
+        if (!(await this.latestOnly.rests())) return;
       }
       await this.fetchMissing(answers, asked, call);
       this.show(answers, asked);
@@ -240,7 +242,7 @@ export class Fields {
       showScale(state.values.name, largest, least);
     } else if (field) this.paintField(surface, mesh, field, state, this.answers);
     else {
-      surface.setValues(null, 1);
+      surface.setPieces(mesh.pieces);
       hideLegend();
     }
     this.onPaint(state);
@@ -421,16 +423,16 @@ type FieldQuestion<M extends Method = Method> = Pick<
 export function questionOf<M extends Method>(state: State, method: M): FieldQuestion<M> {
   const sources = startsOf(state);
   const cost = costOf(state);
-  if (cost) {
-    return { sources, cost, ...(state.barriers.length > 0 ? { barriers: state.barriers } : {}) };
-  }
+  const barriers = blockedFaces(state);
+  const blocked = barriers.length > 0 ? { barriers } : {};
+  if (cost) return { sources, cost, ...blocked };
   return {
     sources,
     method,
     ...(method === "approximate" ? { relativeError: state.error } : {}),
     ...(method === "fast" ? { effort: state.effort } : {}),
     ...(state.maxDistance === null ? {} : { maxDistance: state.maxDistance }),
-    ...(state.barriers.length > 0 ? { barriers: state.barriers } : {}),
+    ...blocked,
   };
 }
 

@@ -2,6 +2,8 @@
 import { isAbort } from "../service";
 
 const PATIENCE_MS = 100;
+/** A pointer that is dragged moves several times meanwhile. */
+const REST_MS = 60;
 
 /**
  * Runs one request at a time. The latest one waits for the one that runs, and replaces any other
@@ -30,10 +32,19 @@ export class LatestOnly<Q> {
     this.waiting = request;
   }
 
-  /** Tell whether to refine the answer that was just given: nobody has asked for another. */
-  refines(): boolean {
-    this.isRefining = this.waiting === undefined;
-    return this.isRefining;
+  /**
+   * Wait until no request has come for a moment: then it is time to refine the answer just given.
+   * Return false if another request waits already; one that comes meanwhile aborts this one.
+   */
+  async rests(): Promise<boolean> {
+    const { running } = this;
+    if (!running || this.waiting !== undefined) return false;
+    this.isRefining = true;
+    await new Promise<void>((resolve, reject) => {
+      setTimeout(resolve, REST_MS);
+      running.signal.addEventListener("abort", () => reject(running.signal.reason), { once: true });
+    });
+    return true;
   }
 
   /** Abort the request that runs, and drop the one that waits. */

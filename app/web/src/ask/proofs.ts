@@ -1,8 +1,10 @@
 // The badge of a path: the proof that no other is shorter.
+
 import type { PathAnswer } from "geodesic-client";
 import { byId } from "../dom";
 import type { LoadedMesh } from "../mesh/loader";
 import { service } from "../service";
+import { blockedFaces } from "../state/barriers";
 import { endOf, placedAt, stopsOf } from "../state/places";
 import { type Point, pointOf } from "../state/point";
 import type { Store } from "../state/state";
@@ -68,12 +70,13 @@ export class PathProofs {
   }
 
   private run(outline: PathAnswer, source: Point, target: Point): void {
-    const { mesh, barriers } = this.store.state;
+    const { state } = this.store;
+    const { mesh } = state;
     if (!mesh) return;
     this.stop = new AbortController();
     const { signal } = this.stop;
     this.status.run("drawing", "Proving the path…", this.stop, async (onProgress) => {
-      const call = { barriers, certify: true, onProgress, signal };
+      const call = { barriers: blockedFaces(state), certify: true, onProgress, signal };
       const { certificate } = await service.path(mesh, source, target, call);
       if (outline !== this.outline) return;
       if (!certificate) throw new Error("The service returned no proof.");

@@ -1,8 +1,10 @@
 // The rays of a polar grid: straight lines from each source, as far as they are shortest paths.
+
 import type { StraightLine } from "geodesic-client";
 import { differences } from "../mesh/frame";
 import type { Notes } from "../panel/notes";
 import { service } from "../service";
+import { blockedFaces } from "../state/barriers";
 import { startsOf } from "../state/places";
 import { type Point, pointOf } from "../state/point";
 import type { State } from "../state/state";
@@ -33,7 +35,8 @@ export class Rays {
 
   /** Request the rays that `state` needs and that are not drawn yet, and draw them. */
   follow(state: State): void {
-    const { mesh, barriers, polar } = state;
+    const { mesh, polar } = state;
+    const barriers = blockedFaces(state);
     const sources = startsOf(state);
     const largest = this.fields.of(state)?.largest ?? 0;
     if (!mesh || !polar || hasCost(state) || largest === 0 || !this.sceneView.surface) {

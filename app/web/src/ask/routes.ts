@@ -1,11 +1,13 @@
 // The path to the target, which follows the pointer: fast at first, and the shortest once the
 // pointer rests. And the steps of its search.
+
 import type { PathAnswer, Step, SurfaceCost } from "geodesic-client";
 import { byId, count, written } from "../dom";
 import { InputError } from "../inputError";
 import { differences } from "../mesh/frame";
 import type { Notes } from "../panel/notes";
 import { service } from "../service";
+import { blockedFaces } from "../state/barriers";
 import { endOf, nameOf, startsOf, stopsOf } from "../state/places";
 import { type Point, pointOf, writePoint } from "../state/point";
 import { type State, unitOf } from "../state/state";
@@ -68,7 +70,8 @@ export class Routes {
 
   /** Request the path that ``state`` asks for. */
   follow(state: State): void {
-    const { mesh, barriers, isReadable } = state;
+    const { mesh, isReadable } = state;
+    const barriers = blockedFaces(state);
     const [sources, target, waypoints] = [startsOf(state), endOf(state), stopsOf(state)];
     this.unit = unitOf(state);
     this.measure = measureOf(state);
@@ -125,8 +128,8 @@ export class Routes {
         this.show(await cheapest(mesh, question, cost, signal), request);
         return;
       }
-      const refines = () => this.latestOnly.refines();
-      for await (const outline of askRoute(mesh, question, signal, refines)) {
+      const rests = () => this.latestOnly.rests();
+      for await (const outline of askRoute(mesh, question, signal, rests)) {
         this.show(outline, request);
       }
     } catch (failure) {
@@ -239,19 +242,19 @@ async function cheapest(
 }
 
 /**
- * Yield a fast path, then the shortest, unless there is a newer question by then; of several
- * sources, both start at the nearest.
+ * Yield a fast path, then the shortest once the question rests; of several sources, both start at
+ * the nearest.
  */
 export async function* askRoute(
   mesh: string,
   question: RouteQuestion,
   signal: AbortSignal,
-  refines: () => boolean,
+  rests: () => Promise<boolean>,
 ): AsyncGenerator<PathAnswer> {
   const { target, waypoints, barriers } = question;
   const source = await nearestSource(mesh, question, signal);
   for (const method of ["fast", "exact"] as const) {
-    if (method === "exact" && !refines()) return;
+    if (method === "exact" && !(await rests())) return;
     yield await service.path(mesh, source, target, { waypoints, barriers, method, signal });
   }
 }

@@ -1,8 +1,10 @@
 // The straight line from the first source in a direction, which follows the pointer.
+
 import type { StraightLine } from "geodesic-client";
 import { written } from "../dom";
 import type { Notes } from "../panel/notes";
 import { service } from "../service";
+import { blockedFaces } from "../state/barriers";
 import { startsOf } from "../state/places";
 import type { Point } from "../state/point";
 import { type State, unitOf } from "../state/state";
@@ -51,7 +53,8 @@ export class Walks {
 
   /** Request the line that ``state`` asks for. */
   follow(state: State): void {
-    const { mesh, walk, barriers, isReadable } = state;
+    const { mesh, walk, isReadable } = state;
+    const barriers = blockedFaces(state);
     this.unit = unitOf(state);
     const [start] = startsOf(state);
     const requested = JSON.stringify([mesh, start, walk, barriers, isReadable]);

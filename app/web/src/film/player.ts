@@ -1,8 +1,10 @@
 // The film of the search: asked for, played, paused, scrubbed, and saved as a video.
+
 import { byId } from "../dom";
 import { InputError } from "../inputError";
 import { foldOnPhone } from "../panel/appearance";
 import { service } from "../service";
+import { blockedFaces } from "../state/barriers";
 import { startsOf } from "../state/places";
 import { type State, type Store, unitOf } from "../state/state";
 import type { Status } from "../status";
@@ -83,7 +85,7 @@ export class Player {
 
   private begin(): void {
     const { state } = this.store;
-    const { mesh, barriers } = state;
+    const { mesh } = state;
     const sources = startsOf(state);
     if (mesh === null) return;
     this.stop.abort();
@@ -91,7 +93,7 @@ export class Player {
     const { signal } = this.stop;
     this.asked = question(state);
     this.status.run("busy", "Following the sweep…", this.stop, async (onProgress) => {
-      const call = { barriers, steps: STEPS, onProgress, signal };
+      const call = { barriers: blockedFaces(state), steps: STEPS, onProgress, signal };
       const sweep = await service.sweepSteps(mesh, sources, call);
       signal.throwIfAborted();
       this.film = new Film(sweep);

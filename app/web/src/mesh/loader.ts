@@ -49,6 +49,8 @@ export class LoadedMesh {
 
   constructor(
     readonly document: MeshDocument,
+    /** The connected piece of each vertex; null where there is one piece only. */
+    readonly pieces: Int32Array | null,
     private readonly shape: ResponseOf<"shape">,
     private readonly worker: LoaderWorker,
   ) {
@@ -147,9 +149,12 @@ export async function loadMesh(
   const worker = new LoaderWorker();
   signal.addEventListener("abort", () => worker.end());
   const { address, apiKey } = service;
-  const shape = await worker.ask({ kind: "mesh", id: document.id, address, apiKey, up }, "shape");
+  const [shape, pieces] = await Promise.all([
+    worker.ask({ kind: "mesh", id: document.id, address, apiKey, up }, "shape"),
+    document.components > 1 ? service.array(document.id, "components", { signal }) : null,
+  ]);
   signal.throwIfAborted();
-  return new LoadedMesh(document, shape, worker);
+  return new LoadedMesh(document, pieces && pieces.data, shape, worker);
 }
 
 /** The worker, with a promise for each kind of response. */

@@ -5,7 +5,7 @@ import { versusOf } from "../ask/fields";
 import { byId, query, written } from "../dom";
 import type { Up } from "../mesh/frame";
 import { service } from "../service";
-import { LONGEST_UNIT, readState, type WrittenState, writeRanges } from "../state/permalink";
+import { LONGEST_UNIT, readState, type WrittenState, writeBarriers } from "../state/permalink";
 import { nameOf, type Place, type Tool } from "../state/places";
 import type { Point } from "../state/point";
 import { parsePlaces, pointOf, type WrittenPoint, writePlaces } from "../state/point";
@@ -193,7 +193,7 @@ export class Controls {
   private showQuestion(state: State): void {
     setValue("points", writePlaces(state));
     setValue("walk", state.walk?.join(", ") ?? "");
-    setValue("barriers", writeRanges(state.barriers));
+    setValue("barriers", writeBarriers(state.barriers));
     setValue("max-distance", state.maxDistance === null ? "" : String(state.maxDistance));
   }
 

@@ -4,6 +4,7 @@ import { bordersOf } from "../ask/borders";
 import { questionOf } from "../ask/fields";
 import { isolinesOf } from "../ask/isolines";
 import { button, byId, download } from "../dom";
+import { objOf } from "../mesh/obj";
 import { service } from "../service";
 import { writeState } from "../state/permalink";
 import { endOf, startsOf } from "../state/places";
@@ -58,6 +59,10 @@ export class ExportPanel {
         if (drawn) download(await glbOf(drawn), "geodesic.glb");
       });
     });
+    byId("obj").addEventListener("click", () => {
+      const mesh = this.drawn()?.mesh;
+      if (mesh) download(objOf(mesh), "mesh.obj");
+    });
     byId("geojson").addEventListener("click", () => {
       const lines = this.drawn()?.lines ?? [];
       const features = lines.map(({ name, points }) => ({
@@ -107,7 +112,7 @@ export class ExportPanel {
         choice.disabled = !isThere;
     }
     for (const id of ["copy-curl", "copy-python"]) byId(id, HTMLButtonElement).disabled = !hasField;
-    for (const id of ["picture", "svg", "glb", "geojson"]) {
+    for (const id of ["picture", "svg", "glb", "geojson", "obj"]) {
       byId(id, HTMLButtonElement).disabled = state.mesh === null;
     }
   }

@@ -19,10 +19,11 @@ export class PlaceList {
     const { places, walk, barriers } = state;
     const rows = places.map((_, i) => this.rowOf(state, i));
     if (walk) rows.push(this.extra("walk", "Straight on from A", { walk: null }));
-    if (barriers.length > 0) {
-      const words = `Barrier of ${count(barriers.length, "face")}`;
-      rows.push(this.extra("barrier", words, { barriers: [] }));
-    }
+    barriers.forEach((faces, i) => {
+      const name = barriers.length > 1 ? `Barrier ${i + 1}` : "Barrier";
+      const words = `${name} of ${count(faces.length, "face")}`;
+      rows.push(this.extra("barrier", words, { barriers: barriers.toSpliced(i, 1) }));
+    });
     this.list.replaceChildren(...rows);
     byId("nothing").hidden = rows.length > 0;
     byId("clear", HTMLButtonElement).disabled = rows.length === 0 && state.maxDistance === null;

@@ -1,6 +1,7 @@
 // Mouse, fingers and keys on the mesh: a click sets a point, a drag moves it.
 import { Vector3 } from "three";
 import { drawnAt, type FacePoint, positionOf } from "../mesh/picking";
+import { blockedFaces, repainted } from "../state/barriers";
 import { type Act, actOf, nameOf, type Place, placedAt, type Tool } from "../state/places";
 import type { Point } from "../state/point";
 import { rounded } from "../state/point";
@@ -95,7 +96,7 @@ export class Pointer {
   private dragFrom(event: PointerEvent): ((spot: Spot) => void) | null {
     if (!this.sceneView.mesh) return null;
     if (this.tool() === "barrier") {
-      const painted = new Set(this.store.state.barriers);
+      const painted = new Set(blockedFaces(this.store.state));
       this.painted = painted;
       return (spot) => this.paint(painted, spot, event.shiftKey);
     }
@@ -141,7 +142,7 @@ export class Pointer {
     const { start, drag, painted } = this;
     const isClick = start !== null && !this.hasMoved(event);
     if (drag && !isClick) drag(event);
-    if (painted) this.store.update({ barriers: [...painted] });
+    if (painted) this.store.update({ barriers: repainted(this.store.state.barriers, painted) });
     this.end();
     if (isClick && !(painted && this.at(event))) {
       const altKey = event.altKey || isHeld(start, event);
@@ -164,10 +165,10 @@ export class Pointer {
   press(modifiers: Modifiers): void {
     this.use("keys");
     if (this.tool() === "barrier" && this.at(this.middle)) {
-      const painted = new Set(this.store.state.barriers);
+      const painted = new Set(blockedFaces(this.store.state));
       this.paint(painted, this.middle, modifiers.shiftKey);
       this.last = null;
-      this.store.update({ barriers: [...painted] });
+      this.store.update({ barriers: repainted(this.store.state.barriers, painted) });
     } else this.click(this.middle, modifiers);
   }
 
@@ -230,7 +231,7 @@ export class Pointer {
   private abandon(): void {
     const { painted } = this;
     this.letGo();
-    if (painted) this.sceneView.barriers.show(this.sceneView.mesh, this.store.state.barriers);
+    if (painted) this.sceneView.showBarriers(this.store.state);
     this.store.abandonGesture();
   }
 

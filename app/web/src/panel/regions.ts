@@ -1,7 +1,9 @@
 // Points spread over the surface, as starts of their own territories.
+
 import { byId, count, written } from "../dom";
 import { InputError } from "../inputError";
 import { service } from "../service";
+import { blockedFaces } from "../state/barriers";
 import { startsOf } from "../state/places";
 import { pointOf } from "../state/point";
 import { type Store, unitOf } from "../state/state";
@@ -33,7 +35,7 @@ export class Regions {
   /** Add points to the starts, each the farthest from those before. Other places are dropped. */
   private spread(kind: string, value: number): void {
     const { state } = this.store;
-    const { mesh, barriers } = state;
+    const { mesh } = state;
     if (mesh === null) return;
     const stop = new AbortController();
     this.status.run("busy", "Spreading points…", stop, async (onProgress) => {
@@ -41,7 +43,7 @@ export class Regions {
       const wanted = kind === "count" ? { count: Math.round(value) } : { radius: value };
       if (!(value > 0) || (wanted.count ?? 0) > MOST) throw wrongNumber(kind);
       const { points, covering_radius, warnings } = await service.samples(mesh, {
-        ...{ starts, barriers, ...wanted },
+        ...{ starts, barriers: blockedFaces(state), ...wanted },
         onProgress,
         signal: stop.signal,
       });

@@ -3,6 +3,7 @@
 import { type Question, toWire } from "geodesic-client";
 import { costOf } from "../ask/costs";
 import { questionOf } from "../ask/fields";
+import { blockedFaces } from "../state/barriers";
 import { endOf, stopsOf } from "../state/places";
 import type { Point } from "../state/point";
 import type { State } from "../state/state";
@@ -12,7 +13,7 @@ type Body = Record<string, unknown>;
 /** Return the question for the path from a source to a target. */
 export function pathOf(state: State, source: Point, target: Point): Question<"path"> {
   const cost = costOf(state);
-  const question = { source, target, waypoints: stopsOf(state), barriers: state.barriers };
+  const question = { source, target, waypoints: stopsOf(state), barriers: blockedFaces(state) };
   return cost ? { ...question, cost } : question;
 }
 

@@ -2,6 +2,7 @@
 import type { Effort, Method } from "geodesic-client";
 import { InputError } from "../inputError";
 import type { Triple, Up } from "../mesh/frame";
+import type { Barriers } from "./barriers";
 import type { Place } from "./places";
 import { parsePoint, type WrittenPoint, writePoint } from "./point";
 import {
@@ -41,7 +42,7 @@ export function writeState(state: State): string {
     if (part.length > 0) query.set(name, part.map(writePlace).join(";"));
   }
   if (state.walk) query.set("walk", state.walk.join(","));
-  if (state.barriers.length > 0) query.set("barriers", writeRanges(state.barriers));
+  if (state.barriers.length > 0) query.set("barriers", writeBarriers(state.barriers));
   if (state.method !== INITIAL.method) query.set("method", state.method);
   if (state.error !== INITIAL.error) query.set("error", String(state.error));
   if (state.effort !== INITIAL.effort) query.set("effort", String(state.effort));
@@ -96,7 +97,7 @@ export function readState(search: string): WrittenState {
     places: [...sources, ...others].map(readPlace),
     starts: Math.max(1, sources.length),
     walk: readWalk(query.get("walk") ?? ""),
-    barriers: readRanges(query.get("barriers") ?? ""),
+    barriers: readBarriers(query.get("barriers") ?? ""),
     method: oneOf<Method>(query.get("method"), METHODS),
     error: positive(query.get("error")) ?? INITIAL.error,
     effort: EFFORTS.find((effort) => String(effort) === query.get("effort")) ?? INITIAL.effort,
@@ -180,8 +181,20 @@ function readWalk(text: string): Triple | null {
   return numbers as Triple;
 }
 
-/** Write numbers as ranges, in order: 3,7,40-59. */
-export function writeRanges(numbers: number[]): string {
+/** Write each barrier as ranges of faces: 3,7,40-59;80-95. */
+export function writeBarriers(barriers: Barriers): string {
+  return barriers.map(writeRanges).join(";");
+}
+
+function readBarriers(text: string): Barriers {
+  return text
+    .split(";")
+    .map(readRanges)
+    .filter(({ length }) => length > 0);
+}
+
+/** Write numbers as ranges, in order. */
+function writeRanges(numbers: readonly number[]): string {
   const ranges: [number, number][] = [];
   for (const number of numbers.toSorted((a, b) => a - b)) {
     const last = ranges.at(-1);
@@ -202,7 +215,7 @@ function readRanges(text: string): number[] {
       throw new InputError(
         "Not a range of faces",
         `“${part}” is neither the number of a face nor a range of them.`,
-        "Write 3,7,40-59 for the faces 3, 7 and 40 to 59.",
+        "Write 3,7,40-59 for the faces 3, 7 and 40 to 59; a semicolon begins another barrier.",
       );
     }
     return Array.from({ length }, (_, i) => Number(first) + i);

@@ -1,6 +1,7 @@
 // The state of the page: all that the user has chosen. Everything that is drawn follows from it.
 import type { Effort, Method } from "geodesic-client";
 import type { Triple, Up } from "../mesh/frame";
+import type { Barriers } from "./barriers";
 import type { Place } from "./places";
 
 export type Shade = "distance" | "territories" | "difference" | "proof";
@@ -35,7 +36,7 @@ export interface State {
   starts: number;
   /** Direction and length of a straight line from the first start, in mesh units. */
   walk: Triple | null;
-  barriers: number[];
+  barriers: Barriers;
   method: Method;
   error: number;
   effort: Effort;

@@ -17,6 +17,7 @@ import { frontOf, type Up } from "../mesh/frame";
 import { type LoadedMesh, loadMesh } from "../mesh/loader";
 import { drawnAt, type FacePoint, type IsHidden, isSeen, pick } from "../mesh/picking";
 import { Plane } from "../mesh/plane";
+import { blockedFaces } from "../state/barriers";
 import { nameOf } from "../state/places";
 import type { Section, State } from "../state/state";
 import { type Rgb, territory } from "./colours";
@@ -221,8 +222,8 @@ export class SceneView {
     this.labels.show(shown);
   }
 
-  showBarriers({ barriers, isReadable }: State): void {
-    this.barriers.show(this.mesh, isReadable ? barriers : []);
+  showBarriers(state: State): void {
+    this.barriers.show(this.mesh, state.isReadable ? blockedFaces(state) : []);
   }
 
   showRoute(outline: PathAnswer | null): void {

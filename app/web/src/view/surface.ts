@@ -160,6 +160,12 @@ export class Surface {
     this.tints.needsUpdate = true;
   }
 
+  /** Colour by pieces, given by vertex; null: one colour for all. */
+  setPieces(pieces: Int32Array | null): void {
+    this.setValues(pieces && new Uint8Array(pieces.length), 1);
+    this.setTerritories(pieces);
+  }
+
   /** Show colours in a light, or as they are. */
   setLit(isLit: boolean): void {
     this.uniform("lit").value = isLit ? 1 : 0;
