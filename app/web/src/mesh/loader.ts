@@ -154,7 +154,7 @@ export async function loadMesh(
     document.components > 1 ? service.array(document.id, "components", { signal }) : null,
   ]);
   signal.throwIfAborted();
-  return new LoadedMesh(document, pieces && pieces.data, shape, worker);
+  return new LoadedMesh(document, pieces?.data ?? null, shape, worker);
 }
 
 /** The worker, with a promise for each kind of response. */

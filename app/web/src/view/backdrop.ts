@@ -29,10 +29,14 @@ const FRAGMENT = /* glsl */ `
     gl_FragDepth = texture2D(depths, place).r;
   }`;
 
+/** Samples of each pixel, which smooth edges. */
+const SAMPLES = 4;
+const MANY_FACES = 50_000;
+
 export class Backdrop {
   private isFresh = false;
   private readonly target = new WebGLRenderTarget(1, 1, {
-    samples: 4,
+    samples: SAMPLES,
     depthTexture: new DepthTexture(1, 1),
   });
   private readonly screen = new Scene();
@@ -66,6 +70,25 @@ export class Backdrop {
       this.isFresh = true;
     }
     this.renderer.render(this.screen, this.camera);
+  }
+
+  /**
+   * Choose how smoothly edges of a mesh of so many faces are drawn. Without a graphics card, samples
+   * within pixels double the time of a large one.
+   */
+  fit(faces: number): void {
+    const samples = this.isSoftware && faces > MANY_FACES ? 0 : SAMPLES;
+    if (samples === this.target.samples) return;
+    this.target.samples = samples;
+    this.target.dispose(); // it is made anew when it is drawn
+    this.forget();
+  }
+
+  private get isSoftware(): boolean {
+    const gl = this.renderer.getContext();
+    const about = gl.getExtension("WEBGL_debug_renderer_info");
+    const name = about ? String(gl.getParameter(about.UNMASKED_RENDERER_WEBGL)) : "";
+    return /swiftshader|llvmpipe|software/i.test(name);
   }
 
   /** Drop the image, after the scene or the camera has changed. */

@@ -55,7 +55,6 @@ export class Stage {
   onFrame: () => void = () => undefined;
   private isDue = false;
   private patient = 0;
-  private isStill = false;
   private readonly waiting: (() => void)[] = [];
 
   constructor(readonly canvas: HTMLCanvasElement) {
@@ -97,7 +96,6 @@ export class Stage {
 
   /** Draw a frame soon. */
   invalidate(): void {
-    this.isStill = false;
     this.backdrop.forget();
     this.schedule();
   }
@@ -120,11 +118,16 @@ export class Stage {
     return new Promise((resolve) => this.waiting.push(resolve));
   }
 
+  /** Draw a mesh of so many faces from now on. */
+  fit(faces: number): void {
+    this.backdrop.fit(faces);
+  }
+
   /** Compile the shaders of an object before it is first shown. */
   warmUp(object: Object3D): void {
     this.scene.add(object);
+    this.backdrop.forget();
     this.renderNow();
-    this.renderNow(); // the second time through the backdrop
     this.scene.remove(object);
     this.invalidate();
   }
@@ -286,8 +289,6 @@ export class Stage {
   /** Return the picture that is drawn now, on the ground of the page. */
   picture(): HTMLCanvasElement {
     const { width, height } = this.canvas;
-    this.backdrop.forget();
-    this.isStill = false;
     this.renderNow();
     const picture = Object.assign(document.createElement("canvas"), { width, height });
     const context = picture.getContext("2d");
@@ -301,9 +302,7 @@ export class Stage {
   /** Draw now, so that the canvas can be read before the browser shows it. */
   renderNow(): void {
     this.renderer.clear();
-    if (this.isStill) this.backdrop.draw(this.scene, this.camera);
-    else this.renderer.render(this.scene, this.camera);
-    this.isStill = true;
+    this.backdrop.draw(this.scene, this.camera);
     this.renderer.render(this.overlay, this.camera);
     this.compass.draw(this.renderer);
   }

@@ -101,6 +101,7 @@ export class SceneView {
     const { array: normals } = mesh.geometry.getAttribute("normal");
     this.stage.shape = positions;
     this.stage.front.set(...frontOf(positions, normals));
+    this.stage.fit(document.faces);
     this.stage.compass.isShown = true;
     this.stage.compass.name(mesh.frame.up);
     this.stage.add(this.surface.object);
