@@ -60,7 +60,9 @@ _FOLLOW = """async places => {
         canvas.dispatchEvent(new PointerEvent('pointermove', {
             clientX, clientY, pointerId: 1, bubbles: true
         }));
-        while (root.dataset.state !== 'ready') await tick();  // each is drawn in a frame of its own
+        // Until the rough path is there: the exact one comes once the pointer rests.
+        while (readout.dataset.target === before && root.dataset.state !== 'ready') await tick();
+        await new Promise(requestAnimationFrame);
         answered += readout.dataset.target !== before;
     }
     return {answered, seconds: (performance.now() - start) / 1000};
