@@ -855,6 +855,7 @@ def test_a_long_query_is_rough_first_tells_its_progress_and_can_be_cancelled(
 
     view.ask("v1")
     rough.wait_for()
+    told.wait_for()  # of the exact distances, which are begun once nothing else is asked
     stopped = server.metric("geodesic_cancellations_total")
     view.ask("v2")  # stops the work on exact distances from v1
     wait_until(lambda: server.metric("geodesic_cancellations_total") > stopped)

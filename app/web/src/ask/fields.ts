@@ -158,8 +158,9 @@ export class Fields {
     try {
       if (this.takesLong(asked, answers)) {
         const { sources, ...question } = questionOf({ ...asked, effort: 1 }, "fast");
+        const { signal } = call; // progress is told of the work that remains
         answers.rough = fieldOf(
-          await service.distances(asked.mesh, sources, { ...question, ...call }),
+          await service.distances(asked.mesh, sources, { ...question, signal }),
         );
         this.show(answers, asked);
         if (!(await this.latestOnly.rests())) return;
