@@ -282,6 +282,7 @@ def test_a_choice_of_colours_and_the_end_of_their_scale(view: View, sphere: str)
 
     assert view.text("#tick-2") == "1"
     assert (np.abs(view.pixels() - magma).max(axis=2) > 25).mean() > 0.05
+    assert query_of(view)["range"] == ["1"]
     view.page.reload()
     view.wait()
     assert view.page.input_value("#palette") == "magma"
