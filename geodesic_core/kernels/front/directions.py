@@ -30,7 +30,7 @@ from geodesic_core.kernels.front.state import (
     directed,
 )
 from geodesic_core.kernels.front.window import TURN, Window, turned
-from geodesic_core.kernels.jit import inlined, kernel, pointers
+from geodesic_core.kernels.jit import borrowed, inlined, kernel, pointers
 from geodesic_core.kernels.mesh.build import angle_of
 from geodesic_core.kernels.mesh.half_edges import (
     APEX_ANGLE,
@@ -124,12 +124,46 @@ def seen_in_mirror(window: Window) -> Window:
 
 
 @kernel
+def row_of_site(sites: Sites, node: int, face: int) -> int:
+    """Return the row of a site in one of its faces."""
+    for k in range(len(sites.ints)):
+        if sites.ints[k, NODE] == node and sites.ints[k, FACE] == face:
+            return k
+    return -1
+
+
+@inlined
+def straight_angle(topology: Topology, vertices: Vertices, sites: Sites, v: int) -> float:
+    """Return the angle at which the last leg of the path to node v leaves its predecessor.
+
+    That is a source, or a bend if the sweep carries directions from there.
+    """
+    geometry, site_rows = pointers(topology.geometry), pointers(sites)
+    h, source = vertices.winner_ints[v, ENTRY_EDGE], vertices.winner_ints[v, PREDECESSOR]
+    x = geometry[ROW * h + COS_LEFT] * geometry[ROW * h + LENGTH_LEFT]
+    y = geometry[ROW * h + SIN_LEFT] * geometry[ROW * h + LENGTH_LEFT]
+    if v >= len(topology.total_angle):
+        x, y = weights_in_frame(geometry, site_rows.weights, 3 * row_of_site(sites, v, h // 3), h)
+    turn = vertices.turn[v]
+    if math.isnan(turn):  # the path crosses no edge
+        if source >= len(topology.total_angle):
+            turn = turns_at_site(geometry, site_rows, row_of_site(sites, source, h // 3), h)[0]
+        elif topology.links[h, TAIL] == source:
+            turn = turn_at_tail(geometry, h)
+        else:
+            turn = turn_at_tail(geometry, following(h)) + right_angle(geometry, h) - math.pi
+    direction = math.atan2(y - vertices.winner[v, 1], x - vertices.winner[v, 0])
+    return turn - direction if vertices.mirrored[v] else turn + direction
+
+
+@kernel
 def angles_at_sources(topology: Topology, vertices: Vertices, sites: Sites) -> tuple[Floats, Ints]:
     """Return the angles at which shortest paths leave their source, and how often they bend.
 
     (N,) radians in the frame of the source, by node; NaN where unreached, and at a source. (N,)
     numbers of bends, -1 where unreached. O(N).
     """
+    topology, vertices, sites = borrowed(topology), borrowed(vertices), borrowed(sites)
     count = len(vertices.distance)
     angles, bends = np.full(count, np.nan), np.full(count, -1, np.int32)
     chain = np.empty(count, np.int32)
@@ -158,6 +192,7 @@ def angles_of_legs(topology: Topology, vertices: Vertices, sites: Sites) -> tupl
     (N,) radians by node, at which the leg leaves its source or bend, and at which it is seen from
     the vertex; NaN where unreached, and at sources. The sweep carries directions from bends. O(N).
     """
+    topology, vertices, sites = borrowed(topology), borrowed(vertices), borrowed(sites)
     count = len(vertices.distance)
     leaving, arriving = np.full(count, np.nan), np.full(count, np.nan)
     for v in range(len(topology.total_angle)):
@@ -176,36 +211,3 @@ def angle_back(topology: Topology, vertices: Vertices, v: int) -> float:
     dx, dy = ax - vertices.winner[v, 0], ay - vertices.winner[v, 1]
     turn = math.atan2(ax * dy - ay * dx, ax * dx + ay * dy)
     return float(geometry[h, APEX_ANGLE]) + max(turn, 0.0)
-
-
-@kernel
-def straight_angle(topology: Topology, vertices: Vertices, sites: Sites, v: int) -> float:
-    """Return the angle at which the last leg of the path to node v leaves its predecessor.
-
-    That is a source, or a bend if the sweep carries directions from there.
-    """
-    geometry, site_rows = pointers(topology.geometry), pointers(sites)
-    h, source = vertices.winner_ints[v, ENTRY_EDGE], vertices.winner_ints[v, PREDECESSOR]
-    x = geometry[ROW * h + COS_LEFT] * geometry[ROW * h + LENGTH_LEFT]
-    y = geometry[ROW * h + SIN_LEFT] * geometry[ROW * h + LENGTH_LEFT]
-    if v >= len(topology.total_angle):
-        x, y = weights_in_frame(geometry, site_rows.weights, 3 * row_of_site(sites, v, h // 3), h)
-    turn = vertices.turn[v]
-    if math.isnan(turn):  # the path crosses no edge
-        if source >= len(topology.total_angle):
-            turn = turns_at_site(geometry, site_rows, row_of_site(sites, source, h // 3), h)[0]
-        elif topology.links[h, TAIL] == source:
-            turn = turn_at_tail(geometry, h)
-        else:
-            turn = turn_at_tail(geometry, following(h)) + right_angle(geometry, h) - math.pi
-    direction = math.atan2(y - vertices.winner[v, 1], x - vertices.winner[v, 0])
-    return turn - direction if vertices.mirrored[v] else turn + direction
-
-
-@kernel
-def row_of_site(sites: Sites, node: int, face: int) -> int:
-    """Return the row of a site in one of its faces."""
-    for k in range(len(sites.ints)):
-        if sites.ints[k, NODE] == node and sites.ints[k, FACE] == face:
-            return k
-    return -1
