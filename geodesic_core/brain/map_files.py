@@ -1,4 +1,4 @@
-"""Files of values and labels at vertices: CIFTI-2, and GIFTI of one hemisphere."""
+"""Files of values and labels at vertices: CIFTI-2, and GIFTI and FreeSurfer's of one hemisphere."""
 
 import colorsys
 from collections.abc import Mapping, Sequence
@@ -16,8 +16,9 @@ from geodesic_core.brain.parcellation import Parcellation
 from geodesic_core.errors import InvalidArgument
 
 _METRICS = (".func.gii", ".shape.gii")
-_HUE_STEP, _SATURATION, _VALUE = 0.6180339887, 0.6, 0.9
-"""Of the colours of parcels: each hue is a golden section of the circle from the last one"""
+_MORPHOMETRY = (".curv", ".sulc", ".thickness", ".area", ".volume")
+_HUE_STEP, _SATURATION_STEP, _VALUE = 0.7548776662, 0.5698402910, 0.9
+"""Of the colours of parcels: by these shares, points of a square stay far from each other"""
 
 
 def load_maps(source: MapSource, cortex: Cortex) -> Floats:
@@ -58,8 +59,9 @@ def write_maps(path: str | Path, cortex: Cortex, values: ArrayLike, names: Seque
     Parameters
     ----------
     path
-        ``.dscalar.nii``, which has the vertices of the region; or ``.func.gii`` or ``.shape.gii``
-        of one hemisphere, with 0 outside of it.
+        ``.dscalar.nii``, which has the vertices of the region; or of one hemisphere, with 0 outside
+        of it, ``.func.gii``, ``.shape.gii`` or, with one map, FreeSurfer's ``.curv``, ``.sulc``,
+        ``.thickness``, ``.area`` or ``.volume``.
     cortex
         From `load_cortex`.
     values
@@ -70,7 +72,8 @@ def write_maps(path: str | Path, cortex: Cortex, values: ArrayLike, names: Seque
     Raises
     ------
     InvalidArgument
-        The name ends otherwise; GIFTI would have to hold two hemispheres; the names are too few.
+        The name ends otherwise; the file would have to hold two hemispheres, or FreeSurfer's two
+        maps; the names are too few.
     OtherSurface
         There are not as many values as vertices.
     MissingExtra
@@ -83,14 +86,20 @@ def write_maps(path: str | Path, cortex: Cortex, values: ArrayLike, names: Seque
     >>> gc.brain.write_maps(f"{mkdtemp()}/areas.dscalar.nii", cortex, cortex.areas, ["area"])
     """
     target = Path(path)
-    kind = kind_of(target, (".dscalar.nii", *_METRICS))
+    kind = kind_of(target, (".dscalar.nii", *_METRICS, *_MORPHOMETRY))
     maps = np.atleast_2d(as_values(values, cortex)).astype(np.float32)
     if len(names) != len(maps):
         raise InvalidArgument(f"there are {len(names)} names for {len(maps)} maps")
-    if kind in _METRICS:
+    if kind != ".dscalar.nii":
+        _refuse_both(target, cortex)
         inside = np.zeros_like(maps)
         inside[:, cortex.region] = maps[:, cortex.region]
-        _write_gifti(target, cortex, inside, names, "NIFTI_INTENT_SHAPE")
+        if kind in _METRICS:
+            _write_gifti(target, cortex, inside, names, "NIFTI_INTENT_SHAPE")
+            return
+        if len(maps) > 1:
+            raise InvalidArgument(f"{path} holds one map: write GIFTI or CIFTI for {len(maps)}")
+        nibabel("freesurfer", "write_maps").write_morph_data(target, inside[0])
         return
     axes = (
         nibabel("cifti2", "write_maps").ScalarAxis(list(names)),
@@ -105,14 +114,15 @@ def write_labels(path: str | Path, parcels: Parcellation) -> None:
     Parameters
     ----------
     path
-        ``.dlabel.nii``, or ``.label.gii`` of one hemisphere.
+        ``.dlabel.nii``; or of one hemisphere ``.label.gii``, or FreeSurfer's ``.annot``, which
+        counts the parcels from 1.
     parcels
         From `load_parcels`. Those of both hemispheres that have one number are counted from 1.
 
     Raises
     ------
     InvalidArgument
-        The name ends otherwise, or GIFTI would have to hold two hemispheres.
+        The name ends otherwise, or the file would have to hold two hemispheres.
     MissingExtra
         It needs nibabel, the extra ``brain``.
 
@@ -127,13 +137,17 @@ def write_labels(path: str | Path, parcels: Parcellation) -> None:
     (1, 2)
     """
     target = Path(path)
-    kind = kind_of(target, (".dlabel.nii", ".label.gii"))
+    kind = kind_of(target, (".dlabel.nii", ".label.gii", ".annot"))
     cortex, count = parcels.cortex, len(parcels.names)
     keys = parcels.keys if len(set(parcels.keys)) == count else tuple(range(1, count + 1))
+    if kind != ".dlabel.nii":
+        _refuse_both(target, cortex)
+    if kind == ".annot":
+        _write_annotation(target, parcels)
+        return
     table = {0: ("???", (0.0, 0.0, 0.0, 0.0))}
-    for k, (key, name) in enumerate(zip(keys, parcels.names, strict=True)):
-        red, green, blue = colorsys.hsv_to_rgb(k * _HUE_STEP % 1.0, _SATURATION, _VALUE)
-        table[key] = (name, (red, green, blue, 1.0))
+    for key, name, colour in zip(keys, parcels.names, _colours(count), strict=True):
+        table[key] = (name, (*colour, 1.0))
     labels = np.array([*keys, 0], np.int32)[parcels.parcel_of]
     if kind == ".label.gii":
         _write_gifti(target, cortex, labels[None], ["parcels"], "NIFTI_INTENT_LABEL", table)
@@ -145,6 +159,28 @@ def write_labels(path: str | Path, parcels: Parcellation) -> None:
     write_cifti(target, kind, axes, labels[None, cortex.region].astype(np.float32), cortex.facts)
 
 
+def _refuse_both(path: Path, cortex: Cortex) -> None:
+    if len(cortex.structures) > 1:
+        raise InvalidArgument(f"{path} holds one hemisphere: write CIFTI for both")
+
+
+def _colours(count: int) -> list[tuple[float, float, float]]:
+    """Return a colour for each of several parcels; neighbours in the list differ most."""
+    return [
+        colorsys.hsv_to_rgb(k * _HUE_STEP % 1.0, 0.45 + 0.5 * (k * _SATURATION_STEP % 1.0), _VALUE)
+        for k in range(count)
+    ]
+
+
+def _write_annotation(path: Path, parcels: Parcellation) -> None:
+    """Write parcels as FreeSurfer has them: the colour of a vertex tells its parcel."""
+    unknown = [0, 0, 0, 0]
+    rows = [[*(round(255 * x) for x in colour), 0] for colour in _colours(len(parcels.names))]
+    table, names = np.array([unknown, *rows], np.int64), ["unknown", *parcels.names]
+    freesurfer = nibabel("freesurfer", "write_labels")
+    freesurfer.write_annot(path, parcels.parcel_of + 1, table, names, fill_ctab=True)
+
+
 def _write_gifti(
     path: Path,
     cortex: Cortex,
@@ -153,8 +189,6 @@ def _write_gifti(
     intent: str,
     table: Mapping[int, tuple[str, tuple[float, ...]]] | None = None,
 ) -> None:
-    if len(cortex.structures) > 1:
-        raise InvalidArgument(f"{path} holds one hemisphere: write CIFTI for both")
     gifti = nibabel("gifti.gifti", "writing GIFTI")
     arrays = [
         gifti.GiftiDataArray(values, intent, meta={"Name": name})

@@ -144,11 +144,13 @@ def test_values_and_labels_come_back_to_the_bit(surfaces, masks, tmp_path):
     cortex = gc.brain.load_cortex(surfaces, masks, "passes")
     one = gc.brain.load_cortex({"left": surfaces["left"]}, masks["left"], "passes")
     rng = np.random.default_rng(3)
-    for each, suffixes in ((cortex, ["dscalar.nii"]), (one, ["func.gii", "shape.gii"])):
-        values = rng.normal(size=(2, len(each.areas))).astype(np.float32)
+    two, single = ["func.gii", "shape.gii"], ["curv", "thickness"]
+    for each, suffixes in ((cortex, ["dscalar.nii"]), (one, [*two, *single])):
         for suffix in suffixes:
-            path = tmp_path / f"two.{suffix}"
-            gc.brain.write_maps(path, each, values, ["a", "b"])
+            names = ["a"] if suffix in single else ["a", "b"]
+            values = rng.normal(size=(len(names), len(each.areas))).astype(np.float32)
+            path = tmp_path / f"lh.{suffix}"
+            gc.brain.write_maps(path, each, values, names)
             found = gc.brain.load_maps(path, each)
             assert_array_equal(found[:, each.region], values[:, each.region])
     keys = keys_of(surfaces)
@@ -158,6 +160,28 @@ def test_values_and_labels_come_back_to_the_bit(surfaces, masks, tmp_path):
         again = gc.brain.load_parcels(tmp_path / path, each)
         assert (again.names, again.keys) == (parcels.names, parcels.keys)
         assert_array_equal(again.parcel_of, parcels.parcel_of)
+
+
+def test_parcels_as_freesurfer_has_them(surfaces, masks, tmp_path):
+    """As many as of Schaefer's largest: no two have one colour, by which they are told apart."""
+    ball = gc.samples.sphere(3000)
+    cortex = gc.brain.load_cortex({"left": ball})
+    keys = np.arange(len(ball.vertices)) % 1001  # of 0 there is no parcel
+    parcels = gc.brain.load_parcels(keys, cortex)
+    gc.brain.write_labels(tmp_path / "lh.many.annot", parcels)
+    labels, table, names = nibabel.freesurfer.read_annot(tmp_path / "lh.many.annot")
+    assert_array_equal(labels, np.where(keys > 0, keys, -1))  # black stands for none
+    assert [name.decode() for name in names[1:]] == list(parcels.names)
+    assert len(np.unique(table[:, :3], axis=0)) == 1001
+    again = gc.brain.load_parcels(tmp_path / "lh.many.annot", cortex)
+    assert (again.names, again.keys) == (parcels.names, tuple(range(1, 1001)))
+    assert_array_equal(again.parcel_of, parcels.parcel_of)
+
+    both = gc.brain.load_cortex(surfaces, masks, "passes")
+    with pytest.raises(gc.errors.InvalidArgument, match="holds one hemisphere"):
+        gc.brain.write_labels(tmp_path / "x.annot", gc.brain.load_parcels(keys_of(surfaces), both))
+    with pytest.raises(gc.errors.InvalidArgument, match="holds one map"):
+        gc.brain.write_maps(tmp_path / "x.curv", cortex, [cortex.areas] * 2, ["a", "b"])
 
 
 @needs_workbench
