@@ -28,6 +28,7 @@ from benchmarks import (
     service,
     sharing,
     topology,
+    virtual_sources,
 )
 from benchmarks.failures import measurement as failures
 from benchmarks.inputs import Inputs
@@ -44,6 +45,7 @@ BENCHMARKS: dict[str, Callable[[Inputs, int], Section | Iterable[Section]]] = {
     "merging": approximate.run_merging,
     "growth": approximate.run_growth,
     "fast": fast.run,
+    "virtual-sources": virtual_sources.run,
     "path": path.run,
     "path-peers": path.run_peers,
     "fast-path": path.run_fast,
