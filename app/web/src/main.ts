@@ -1,5 +1,4 @@
 // The page's parts and their wiring: users change the state, and every part follows it.
-
 import type { About, MeshDocument, PathAnswer } from "geodesic-client";
 import { Borders } from "./ask/borders";
 import { Boundaries } from "./ask/boundaries";

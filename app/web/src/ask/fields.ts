@@ -1,5 +1,4 @@
 // Distances to all vertices: requested when sources, method or limits change, then painted.
-
 import type {
   Call,
   Certificate,

@@ -1,5 +1,4 @@
 // The badge of a path: the proof that no other is shorter.
-
 import type { PathAnswer } from "geodesic-client";
 import { byId } from "../dom";
 import type { LoadedMesh } from "../mesh/loader";

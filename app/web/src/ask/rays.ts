@@ -1,5 +1,4 @@
 // The rays of a polar grid: straight lines from each source, as far as they are shortest paths.
-
 import type { StraightLine } from "geodesic-client";
 import { differences } from "../mesh/frame";
 import type { Notes } from "../panel/notes";

@@ -1,6 +1,5 @@
 // The path to the target, which follows the pointer: fast at first, and the shortest once the
 // pointer rests. And the steps of its search.
-
 import type { PathAnswer, Step, SurfaceCost } from "geodesic-client";
 import { byId, count, written } from "../dom";
 import { InputError } from "../inputError";

@@ -1,5 +1,4 @@
 // The straight line from the first source in a direction, which follows the pointer.
-
 import type { StraightLine } from "geodesic-client";
 import { written } from "../dom";
 import type { Notes } from "../panel/notes";

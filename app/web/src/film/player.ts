@@ -1,5 +1,4 @@
 // The film of the search: asked for, played, paused, scrubbed, and saved as a video.
-
 import { byId } from "../dom";
 import { InputError } from "../inputError";
 import { foldOnPhone } from "../panel/appearance";

@@ -38,6 +38,9 @@ export type LoaderResponse =
 
 type ResponseOf<K> = Extract<LoaderResponse, { kind: K }>;
 
+/** More colours than this tell no piece from another. */
+const MOST_PIECES = 100;
+
 /** A mesh to draw and to pick points of. */
 export class LoadedMesh {
   readonly geometry = new BufferGeometry();
@@ -49,7 +52,7 @@ export class LoadedMesh {
 
   constructor(
     readonly document: MeshDocument,
-    /** The connected piece of each vertex; null where there is one piece only. */
+    /** The connected piece of each vertex; null where they have no colours. */
     readonly pieces: Int32Array | null,
     private readonly shape: ResponseOf<"shape">,
     private readonly worker: LoaderWorker,
@@ -151,7 +154,9 @@ export async function loadMesh(
   const { address, apiKey } = service;
   const [shape, pieces] = await Promise.all([
     worker.ask({ kind: "mesh", id: document.id, address, apiKey, up }, "shape"),
-    document.components > 1 ? service.array(document.id, "components", { signal }) : null,
+    document.components > 1 && document.components <= MOST_PIECES
+      ? service.array(document.id, "components", { signal })
+      : null,
   ]);
   signal.throwIfAborted();
   return new LoadedMesh(document, pieces?.data ?? null, shape, worker);

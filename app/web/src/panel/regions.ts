@@ -1,5 +1,4 @@
 // Points spread over the surface, as starts of their own territories.
-
 import { byId, count, written } from "../dom";
 import { InputError } from "../inputError";
 import { service } from "../service";
