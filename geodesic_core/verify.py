@@ -44,6 +44,21 @@ LONG: Any = np.longdouble if np.finfo(np.longdouble).nmant == 63 else np.float64
 BLOCK = 4096
 """Faces that are checked at once"""
 
+PLY_TYPES = {
+    name: code
+    for code, names in {
+        "i1": "char int8",
+        "u1": "uchar uint8",
+        "i2": "short int16",
+        "u2": "ushort uint16",
+        "i4": "int int32",
+        "u4": "uint uint32",
+        "f4": "float float32",
+        "f8": "double float64",
+    }.items()
+    for name in names.split()
+}
+
 Array = Any  # of numpy; this file is read by people, and checked with meshes
 
 
@@ -663,11 +678,44 @@ def _starts(surface: Surface, sources: list[Source], begins: list[Array]) -> Arr
     return starts
 
 
+def read_ply(path: Path) -> tuple[Array, Array]:
+    """Return vertices and faces of a PLY file whose only list is that of the corners of a face."""
+    header, _, body = path.read_bytes().partition(b"end_header")
+    body = body[body.index(b"\n") + 1 :]
+    words = [line.split() for line in header.decode("ascii").splitlines()]
+    order = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}[words[1][1]]
+    elements: list[tuple[str, int, list[Any]]] = []
+    for line in words:
+        if line[0] == "element":
+            elements.append((line[1], int(line[2]), []))
+        elif line[0] == "property" and line[1] == "list":
+            size, corner = (order + PLY_TYPES[name] for name in line[2:4])
+            elements[-1][2].extend([("size", size), ("corners", corner, (3,))])
+        elif line[0] == "property":
+            elements[-1][2].append((line[2], order + PLY_TYPES[line[1]]))
+    tables = {}
+    lines = body.decode("ascii").splitlines() if order == "=" else []
+    for name, count, fields in elements:
+        row = np.dtype(fields)
+        if order == "=":
+            tables[name] = np.loadtxt(lines[:count], row, ndmin=1)
+            lines = lines[count:]
+        else:
+            tables[name] = np.frombuffer(body, row, count)
+            body = body[count * row.itemsize :]
+    vertices, faces = tables["vertex"], tables["face"]
+    refuse_unless(bool((faces["size"] == 3).all()), "the mesh has faces that are no triangles")
+    positions = [vertices[axis].astype(np.float64) for axis in "xyz"]
+    return np.stack(positions, axis=1), faces["corners"].astype(np.int64)
+
+
 def read_mesh(path: Path) -> tuple[Array, Array, Array]:
-    """Return vertices, faces and lengths of a mesh in an OBJ or OFF file, or a numpy archive."""
+    """Return vertices, faces and lengths of a mesh in an OBJ, OFF or PLY file, or an archive."""
     if path.suffix == ".npz":
         with np.load(path, allow_pickle=False) as mesh:
             return tuple(mesh.get(name) for name in ("vertices", "faces", "lengths"))
+    if path.suffix == ".ply":
+        return *read_ply(path), None
     lines = [line.split("#")[0].split() for line in path.read_text().splitlines()]
     lines = [line for line in lines if line]
     if path.suffix == ".obj":
@@ -678,7 +726,7 @@ def read_mesh(path: Path) -> tuple[Array, Array, Array]:
         ]
     else:
         refuse_unless(
-            path.suffix == ".off" and lines[0] == ["OFF"], f"{path} is no .obj, .off or .npz"
+            path.suffix == ".off" and lines[0] == ["OFF"], f"{path} is no .obj, .off, .ply or .npz"
         )
         count, many = int(lines[1][0]), int(lines[1][1])
         vertices = [[float(x) for x in line[:3]] for line in lines[2 : 2 + count]]
@@ -700,7 +748,7 @@ def parse_source(text: str) -> Source:
 def parser() -> argparse.ArgumentParser:
     """Return what reads the mesh, the certificate and the question from a command line."""
     arguments = argparse.ArgumentParser(description="Check a certificate of geodesic distances.")
-    arguments.add_argument("mesh", type=Path, help="an .obj, .off or .npz file")
+    arguments.add_argument("mesh", type=Path, help="an .obj, .off, .ply or .npz file")
     arguments.add_argument("certificate", type=Path)
     arguments.add_argument("--source", type=parse_source, action="append", required=True)
     arguments.add_argument("--barriers", default="", help="faces that no path crosses, as 3,5,8")

@@ -16,6 +16,7 @@ from geodesic_core.errors import InvalidArgument
 from geodesic_core.fields.certificate import rises_and_jumps
 from geodesic_core.tolerances import CERTIFIED
 from tests.support import random_meshes, zoo
+from tests.support.mesh_files import ply, ply_big_endian, ply_binary
 from tests.support.meshes import mesh_of, random_points
 
 ROUNDED = 1e-13
@@ -437,6 +438,50 @@ def test_the_checker_proves_files_without_the_library(tmp_path):
         refused = run_checker(tmp_path, "mesh.obj", "proof.npz", *wrong)
         assert refused.returncode == 1
         assert re.match(r"refused: [a-z]", refused.stderr)
+
+
+def ply_with_more(vertices, faces):
+    """Return a file with colours, edges, and a number before the corners of each face."""
+    head = (
+        "ply\r\nformat binary_little_endian 1.0\r\ncomment of a scanner\r\n"
+        f"element vertex {len(vertices)}\r\nproperty float x\r\nproperty float y\r\n"
+        "property float z\r\nproperty uchar red\r\nelement edge 1\r\nproperty int from\r\n"
+        f"element face {len(faces)}\r\nproperty short group\r\n"
+        "property list uint8 uint32 vertex_index\r\nend_header\r\n"
+    )
+    points = np.zeros(len(vertices), [("at", "<f4", 3), ("red", "u1")])
+    rows = np.zeros(len(faces), [("group", "<i2"), ("count", "u1"), ("corners", "<u4", 3)])
+    points["at"], rows["count"], rows["corners"] = vertices, 3, faces
+    return head.encode() + points.tobytes() + np.int32(7).tobytes() + rows.tobytes()
+
+
+@pytest.mark.parametrize("write", [ply, ply_binary, ply_big_endian, ply_with_more])
+def test_the_checker_reads_ply(write, tmp_path):
+    mesh = gc.samples.terrain(200)
+    (tmp_path / "mesh.ply").write_bytes(write(mesh.vertices, mesh.faces))
+    mesh = gc.load_mesh(tmp_path / "mesh.ply")
+    gc.exact_distance(mesh, 3).certify().save(tmp_path / "proof.npz")
+    vertices, faces, _ = verify.read_mesh(tmp_path / "mesh.ply")
+    np.testing.assert_array_equal(vertices, mesh.vertices)
+    np.testing.assert_array_equal(faces, mesh.faces)
+    done = run_checker(tmp_path, "mesh.ply", "proof.npz", "--source", "3")
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    "body", [b"", b"ply\n", b"ply\nformat text 1.0\nend_header\n", "quads", "short"]
+)
+def test_the_checker_refuses_ply_that_it_cannot_read(body, tmp_path):
+    mesh = gc.samples.plane(50)
+    gc.exact_distance(mesh, 3).certify().save(tmp_path / "proof.npz")
+    if body == "quads":
+        body = ply(np.eye(4, 3), [[0, 1, 2, 3]])
+    elif body == "short":
+        body = ply_binary(mesh.vertices, mesh.faces)[:-5]
+    (tmp_path / "mesh.ply").write_bytes(body)
+    refused = run_checker(tmp_path, "mesh.ply", "proof.npz", "--source", "3")
+    assert refused.returncode == 1
+    assert re.match(r"refused: [A-Za-z]", refused.stderr), refused.stderr
 
 
 def test_the_checker_knows_lengths_and_barriers(tmp_path):
