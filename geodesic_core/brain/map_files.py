@@ -90,22 +90,21 @@ def write_maps(path: str | Path, cortex: Cortex, values: ArrayLike, names: Seque
     maps = np.atleast_2d(as_values(values, cortex)).astype(np.float32)
     if len(names) != len(maps):
         raise InvalidArgument(f"there are {len(names)} names for {len(maps)} maps")
-    if kind != ".dscalar.nii":
-        _refuse_both(target, cortex)
-        inside = np.zeros_like(maps)
-        inside[:, cortex.region] = maps[:, cortex.region]
-        if kind in _METRICS:
-            _write_gifti(target, cortex, inside, names, "NIFTI_INTENT_SHAPE")
-            return
-        if len(maps) > 1:
-            raise InvalidArgument(f"{path} holds one map: write GIFTI or CIFTI for {len(maps)}")
-        nibabel("freesurfer", "write_maps").write_morph_data(target, inside[0])
+    values = maps[:, cortex.region]
+    if kind == ".dscalar.nii":
+        axis = nibabel("cifti2", "write_maps").ScalarAxis(list(names))
+        axes = (axis, brain_models(cortex.structures, cortex.region))
+        write_cifti(target, kind, axes, values, cortex.facts)
         return
-    axes = (
-        nibabel("cifti2", "write_maps").ScalarAxis(list(names)),
-        brain_models(cortex.structures, cortex.region),
-    )
-    write_cifti(target, kind, axes, maps[:, cortex.region], cortex.facts)
+    _refuse_both(target, cortex)
+    inside = np.zeros_like(maps)
+    inside[:, cortex.region] = values
+    if kind in _METRICS:
+        _write_gifti(target, cortex, inside, names, "NIFTI_INTENT_SHAPE")
+    elif len(maps) > 1:
+        raise InvalidArgument(f"{path} holds one map: write GIFTI or CIFTI for {len(maps)}")
+    else:
+        nibabel("freesurfer", "write_maps").write_morph_data(target, inside[0])
 
 
 def write_labels(path: str | Path, parcels: Parcellation) -> None:
@@ -145,17 +144,14 @@ def write_labels(path: str | Path, parcels: Parcellation) -> None:
     if kind == ".annot":
         _write_annotation(target, parcels)
         return
-    table = {0: ("???", (0.0, 0.0, 0.0, 0.0))}
-    for key, name, colour in zip(keys, parcels.names, _colours(count), strict=True):
-        table[key] = (name, (*colour, 1.0))
+    rows = zip(keys, parcels.names, _colours(count), strict=True)
+    table = {0: ("???", (0.0,) * 4)} | {key: (name, (*colour, 1.0)) for key, name, colour in rows}
     labels = np.array([*keys, 0], np.int32)[parcels.parcel_of]
     if kind == ".label.gii":
         _write_gifti(target, cortex, labels[None], ["parcels"], "NIFTI_INTENT_LABEL", table)
         return
-    axes = (
-        nibabel("cifti2", "write_labels").LabelAxis(["parcels"], [table]),
-        brain_models(cortex.structures, cortex.region),
-    )
+    axis = nibabel("cifti2", "write_labels").LabelAxis(["parcels"], [table])
+    axes = (axis, brain_models(cortex.structures, cortex.region))
     write_cifti(target, kind, axes, labels[None, cortex.region].astype(np.float32), cortex.facts)
 
 
@@ -174,11 +170,10 @@ def _colours(count: int) -> list[tuple[float, float, float]]:
 
 def _write_annotation(path: Path, parcels: Parcellation) -> None:
     """Write parcels as FreeSurfer has them: the colour of a vertex tells its parcel."""
-    unknown = [0, 0, 0, 0]
-    rows = [[*(round(255 * x) for x in colour), 0] for colour in _colours(len(parcels.names))]
-    table, names = np.array([unknown, *rows], np.int64), ["unknown", *parcels.names]
-    freesurfer = nibabel("freesurfer", "write_labels")
-    freesurfer.write_annot(path, parcels.parcel_of + 1, table, names, fill_ctab=True)
+    colours = np.round(255 * np.array(_colours(len(parcels.names)))).astype(np.int64)
+    table = np.pad(colours, ((1, 0), (0, 1)))  # black stands for none, and nothing is transparent
+    write = nibabel("freesurfer", "write_labels").write_annot
+    write(path, parcels.parcel_of + 1, table, ["unknown", *parcels.names], fill_ctab=True)
 
 
 def _write_gifti(

@@ -49,10 +49,9 @@ def read_maps(source: MapSource, structures: Sequence[Structure]) -> list[Maps]:
     """
     found = _by_structure(source, structures)
     maps = [_checked(*each) for each in zip(found, structures, strict=True)]
-    if len({len(each.values) for each in maps}) > 1:
-        raise InvalidArgument(
-            f"the hemispheres have {' and '.join(str(len(each.values)) for each in maps)} maps"
-        )
+    counts = [str(len(each.values)) for each in maps]
+    if len(set(counts)) > 1:
+        raise InvalidArgument(f"the hemispheres have {' and '.join(counts)} maps")
     return maps
 
 
@@ -60,15 +59,11 @@ def _checked(maps: Maps, structure: Structure) -> Maps:
     count, found = structure.count, maps.values.shape[1]
     if found == count:
         return maps
-    are = "one for each face, and must be by vertex"
-    if found != structure.faces:
-        are = "of another subject or resolution"
-    raise OtherSurface(
-        f"there are {found} values for the {count} vertices of the {structure.side} surface: "
-        f"they are {are}",
-        found,
-        count,
-    )
+    are = "of another subject or resolution"
+    if found == structure.faces:
+        are = "one for each face, and must be by vertex"
+    of = f"the {count} vertices of the {structure.side} surface"
+    raise OtherSurface(f"there are {found} values for {of}: they are {are}", found, count)
 
 
 def _by_structure(source: MapSource, structures: Sequence[Structure]) -> list[Maps]:
@@ -84,10 +79,8 @@ def _by_structure(source: MapSource, structures: Sequence[Structure]) -> list[Ma
             pairs = zip(source, structures, strict=True)
             return [_by_structure(one, [structure])[0] for one, structure in pairs]
         else:
-            raise InvalidArgument(
-                f"there are {len(source)} files for {len(structures)} surfaces: give one for each, "
-                "or one that holds all"
-            )
+            there = f"there are {len(source)} files for {len(structures)} surfaces"
+            raise InvalidArgument(f"{there}: give one for each, or one that holds all")
     if isinstance(source, str | Path):
         return _read(Path(source), structures)
     if hasattr(source, "darrays"):
@@ -118,11 +111,9 @@ def _split(values: Floats, structures: Sequence[Structure]) -> list[Maps]:
     rows = np.atleast_2d(values)
     ends = np.cumsum([each.count for each in structures])
     if len(structures) > 1 and rows.shape[1] != ends[-1]:
-        raise OtherSurface(
-            f"there are {rows.shape[1]} values, but the surfaces have {ends[-1]} vertices",
-            rows.shape[1],
-            int(ends[-1]),
-        )
+        found, count = rows.shape[1], int(ends[-1])
+        what = f"there are {found} values, but the surfaces have {count} vertices"
+        raise OtherSurface(what, found, count)
     parts = np.split(rows, ends[:-1], axis=1)
     return [Maps(part, (), None) for part in parts]
 

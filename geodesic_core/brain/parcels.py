@@ -27,6 +27,8 @@ from geodesic_core.search.workspace import Workspace
 
 _ARRAYS = "parcels.npz"
 """Name of the file with all arrays; beside it lies what is finished"""
+_FOUND = ("mean", "least", "centroid", "centroids", "vertices", "vertex_mean")
+"""Those of `ParcelDistances`"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,10 +183,7 @@ def _write(found: ParcelDistances, out: Path, facts: dict[str, Any]) -> None:
         write_cifti(out / name, kind, axes, values, facts)
         write_beside(out / name, facts | {"sha256": sha256_of(out / name)})
     write_labels(out / "parcels.dlabel.nii", parcels)
-    arrays: dict[str, Any] = {
-        name: getattr(found, name)
-        for name in ("mean", "least", "centroid", "centroids", "vertices", "vertex_mean")
-    }
+    arrays: dict[str, Any] = {name: getattr(found, name) for name in _FOUND}
     arrays |= {name: getattr(parcels, name) for name in ("parcel_of", "areas", "names")}
     arrays["facts"] = json.dumps(facts).encode()
     np.savez(out / _ARRAYS, allow_pickle=False, **arrays)
