@@ -86,9 +86,8 @@ export class Backdrop {
 
   private get isSoftware(): boolean {
     const gl = this.renderer.getContext();
-    const about = gl.getExtension("WEBGL_debug_renderer_info");
-    const name = about ? String(gl.getParameter(about.UNMASKED_RENDERER_WEBGL)) : "";
-    return /swiftshader|llvmpipe|software/i.test(name);
+    const named = gl.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL;
+    return /swiftshader|llvmpipe|software/i.test(String(gl.getParameter(named ?? gl.RENDERER)));
   }
 
   /** Drop the image, after the scene or the camera has changed. */
