@@ -299,16 +299,16 @@ def _upper_bounds(
     topology = question.mesh.topology
     # In the inner order, in which neighbours follow each other: their paths cross the same faces.
     ends = ends[np.argsort(topology.inner_vertex[ends])]
-    targets, lengths = topology.inner_vertex[ends], np.empty(len(ends))
+    targets, bounds = topology.inner_vertex[ends], np.full(len(winners.nearest), np.nan)
     crossed = Surface(_faces(surface), numbers, _planes(surface))
     starts = _starts(question.nodes, surface, sources)
 
     def measure(first: int, last: int) -> int:
-        part = targets[first:last], lengths[first:last]
-        measure_paths(topology, winners, crossed, starts, *part)
+        measure_paths(topology, winners, crossed, starts, targets[first:last], bounds)
         return len(ends)
 
     in_slices(len(ends), measure, control)
+    lengths = bounds[targets]
     if not np.isfinite(lengths).all():
         lost = ends[np.isinf(lengths)][0]
         raise InternalError(f"the path to vertex {lost} cannot be traced; please report this mesh")

@@ -1,7 +1,8 @@
 """Upper bounds of distances: lengths of traced paths, with all rounding counted.
 
-A path is traced, and each of its segments measured in the plane of the face that it crosses. Where
-it crosses an edge is a share s of the edge's length, which is taken as exact, from both faces. The
+A path is traced line by line: at the vertex where a line begins, the path of that vertex goes on,
+and its bound is known. Each segment is measured in the plane of the face that it crosses. Where it
+crosses an edge is a share s of the edge's length, which is taken as exact, from both faces. The
 lengths hold for any path over the surface that ends at a source: nothing is assumed of the trace.
 
 A segment is d1·e + d2·f, by the differences of two weights of its ends, which lie between 0 and 1,
@@ -21,7 +22,7 @@ from geodesic_core.kernels.certificates.faces import Faces, Numbers
 from geodesic_core.kernels.jit import borrowed, inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL, Topology
 from geodesic_core.kernels.outcome import Outcome
-from geodesic_core.kernels.paths.backtracing import Winners, trace_path
+from geodesic_core.kernels.paths.backtracing import Winners, trace_lines
 from geodesic_core.tolerances import HALF_ULP as U
 
 ROUNDED = 20.0 * U
@@ -69,27 +70,41 @@ def measure_paths(
     surface: Surface,
     starts: Starts,
     targets: Ints,
-    lengths: Floats,
+    bounds: Floats,
 ) -> None:
-    """Fill ``lengths`` with upper bounds of the distances of nodes.
+    """Fill in upper bounds of the distances of some nodes, and of all where their paths bend.
 
-    Infinite where no path can be traced.
+    ``bounds`` has one for each node, NaN where it is not known yet; infinite where no path can be
+    traced. Each line of a path is measured once: what follows a bend is known from there.
 
-    O(faces crossed).
+    O(faces that lines cross).
     """
-    room = _FIRST_ROOM
+    room, most = _FIRST_ROOM, 4 * len(surface.numbers.faces) + _FIRST_ROOM
     nodes, parameters = np.empty(room, np.int32), np.empty(room)
     faces = np.empty(room, np.int32)
-    for i in range(len(targets)):
-        outcome, count = trace_path(topology, winners, targets[i], nodes, parameters, faces)
-        while outcome == Outcome.PATH_FULL and room <= 4 * len(surface.numbers.faces) + _FIRST_ROOM:
-            room *= 4
-            nodes, parameters = np.empty(room, np.int32), np.empty(room)
-            faces = np.empty(room, np.int32)
-            outcome, count = trace_path(topology, winners, targets[i], nodes, parameters, faces)
-        lengths[i] = math.inf
-        if outcome == Outcome.FINISHED:
-            lengths[i] = length_of(topology, surface, starts, nodes, parameters, faces, count)
+    chain, lengths = np.empty(len(bounds), np.int64), np.empty(len(bounds))
+    for target in targets:
+        v, size = target, 0
+        while math.isnan(bounds[v]) and size < len(chain):
+            outcome, count = trace_lines(topology, winners, v, 1, nodes, parameters, faces)
+            if outcome == Outcome.PATH_FULL and room <= most:
+                room *= 4
+                nodes, parameters = np.empty(room, np.int32), np.empty(room)
+                faces = np.empty(room, np.int32)
+                continue
+            if outcome != Outcome.FINISHED:
+                bounds[v] = math.inf
+            elif count == 1:
+                bounds[v] = start_at(surface, starts, nodes[0])
+            else:
+                chain[size] = v
+                lengths[size] = length_of(
+                    topology, surface, starts, nodes, parameters, faces, count
+                )
+                v, size = -1 - nodes[count - 1], size + 1
+        for i in range(size - 1, -1, -1):
+            bounds[chain[i]] = (bounds[v] + lengths[i]) * (1.0 + 4.0 * U)
+            v = chain[i]
 
 
 @kernel
@@ -102,7 +117,7 @@ def length_of(
     faces: Ints,
     count: int,
 ) -> float:
-    """Return an upper bound of a path's length and its start distance; infinite if it is none."""
+    """Return an upper bound of the length of a line of a path; infinite if it is none."""
     topology, surface, starts = borrowed(topology), borrowed(surface), borrowed(starts)
     total, segments, rows = 0.0, count - 1, surface.planes
     for i in range(segments):
@@ -115,8 +130,7 @@ def length_of(
         y = (w1 - w0) * rows[row, FY]
         size = rows[row, EX] + abs(rows[row, FX]) + rows[row, FY]
         total += math.sqrt(x * x + y * y) + (rows[row, SLACK] + (off0 + off1) * size)
-    start = start_at(surface, starts, nodes[segments])
-    return (start + total * (1.0 + 2.0 * U * (segments + 4))) * (1.0 + 4.0 * U)
+    return total * (1.0 + 2.0 * U * (segments + 4)) * (1.0 + 4.0 * U)
 
 
 @inlined

@@ -72,6 +72,9 @@ from geodesic_core.tolerances import FORKS, GAP, ON_PATH, SAME_PLACE, TRIES, WID
 LAST_AT = 1024
 """Half-edges that a walk remembers to have crossed, about; a power of two."""
 
+ALL_LINES = 2**62
+"""More than a path has"""
+
 TRIED = 2048
 """Walks of a line that are remembered after forks, about; a power of two."""
 
@@ -239,20 +242,34 @@ def trace_path(
     i + 1. A vertex on the way continues the path with its own winner: a line may pass it straight
     on either side only where it is flat. O(faces crossed).
     """
+    return trace_lines(topology, winners, target, ALL_LINES, nodes, parameters, faces)
+
+
+@kernel
+def trace_lines(
+    topology: Topology,
+    winners: Winners,
+    target: int,
+    lines: int,
+    nodes: Ints,
+    parameters: Floats,
+    faces: Ints,
+) -> tuple[Outcome, int]:
+    """Trace the last lines of the same path, at most so many of them."""
     view = view_of(topology, winners)
     last_at = np.empty(LAST_AT, np.int32)
     trail = Trail(pointer(nodes), pointer(parameters), pointer(faces), len(nodes), last_at)
     forks = new_forks()
     nodes[0], parameters[0] = -1 - target, 0.0
     count, end = 1, end_at(view, target)
-    while end.entry_edge >= 0:
+    while end.entry_edge >= 0 and lines > 0:
         outcome, count, v = trace_line(view, end, trail, forks, count)
         if outcome != Outcome.FINISHED:
             return outcome, count
         if count >= len(nodes):
             return Outcome.PATH_FULL, count
         nodes[count], parameters[count] = -1 - v, 0.0
-        count, end = count + 1, end_at(view, v)
+        count, lines, end = count + 1, lines - 1, end_at(view, v)
     return Outcome.FINISHED, count
 
 
