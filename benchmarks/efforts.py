@@ -31,7 +31,7 @@ class Errors(NamedTuple):
 
 
 def run(inputs: Inputs, runs: int) -> Section:  # noqa: ARG001 - as all benchmarks
-    """Compare fast distances with exact ones, and with what is estimated of them."""
+    """Compare the errors of fast distances with their estimates."""
     by_effort: dict[int, list[Errors]] = {effort: [] for effort in EFFORTS}
     meshes, real = 0, 0
     for mesh, sources, is_real in _meshes(inputs):
@@ -69,10 +69,9 @@ def _meshes(inputs: Inputs) -> Iterator[tuple[gc.TriangleMesh, list[int], bool]]
         used = np.unique(mesh.faces).tolist()
         return random.sample(used, min(count, len(used)))
 
-    for path in sorted(inputs.folder.iterdir()):
-        if path.suffix in (".obj", ".ply"):
-            mesh = gc.load_mesh(path)
-            yield mesh, some(mesh, REAL_SOURCES), True
+    for path in sorted([*inputs.folder.glob("*.obj"), *inputs.folder.glob("*.ply")]):
+        mesh = gc.load_mesh(path)
+        yield mesh, some(mesh, REAL_SOURCES), True
     for make in gc.samples.SAMPLES.values():
         mesh = make(SAMPLE_FACES)
         yield mesh, some(mesh, SAMPLE_SOURCES), False
@@ -102,9 +101,9 @@ def _row(effort: int, fields: list[Errors]) -> list[str]:
         _share([each.is_within for each in fields]),
         _share([each.is_within for each in real]),
         _share([each.is_all_within for each in fields]),
-        f"{100 * np.mean([each.mean for each in real]):.2g} %",
+        f"{100 * np.mean([each.mean for each in real]):.2g} %" if real else "–",
     ]
 
 
 def _share(found: list[bool]) -> str:
-    return f"{100 * np.mean(found):.1f} %"
+    return f"{100 * np.mean(found):.1f} %" if found else "–"

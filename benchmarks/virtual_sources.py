@@ -41,8 +41,7 @@ def run(inputs: Inputs, runs: int) -> Section:
         "One source (vertex 0) to all vertices of a prepared mesh, one thread, medians of "
         f"processor time of {runs} by turns: `fast_distance` with `effort=1`, and virtual sources "
         "after Trettner, Bommes and Kobbelt (2021) in single precision, `g++ -O3 -march=native`. "
-        "Errors are against our exact distances, those of the mean by their size; the least one "
-        "is of the vertex that falls shortest.",
+        "Errors are against our exact distances; means are of their absolute values.",
         [
             "mesh",
             "faces",
@@ -52,7 +51,7 @@ def run(inputs: Inputs, runs: int) -> Section:
             "their mean error, %",
             "ours, %",
             "of theirs",
-            "their least and largest, %",
+            "their least and largest error, %",
             "ours, %",
         ],
         rows,

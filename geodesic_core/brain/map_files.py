@@ -18,7 +18,8 @@ from geodesic_core.errors import InvalidArgument
 _METRICS = (".func.gii", ".shape.gii")
 _MORPHOMETRY = (".curv", ".sulc", ".thickness", ".area", ".volume")
 _HUE_STEP, _SATURATION_STEP, _VALUE = 0.7548776662, 0.5698402910, 0.9
-"""Of the colours of parcels: by these shares, points of a square stay far from each other"""
+"""Of the colours of parcels: hue and saturation move on by these shares of their range, so that
+colours stay apart"""
 
 
 def load_maps(source: MapSource, cortex: Cortex) -> Floats:
@@ -102,7 +103,7 @@ def write_maps(path: str | Path, cortex: Cortex, values: ArrayLike, names: Seque
     if kind in _METRICS:
         _write_gifti(target, cortex, inside, names, "NIFTI_INTENT_SHAPE")
     elif len(maps) > 1:
-        raise InvalidArgument(f"{path} holds one map: write GIFTI or CIFTI for {len(maps)}")
+        raise InvalidArgument(f"{path} holds one map: write GIFTI or CIFTI for {len(maps)} maps")
     else:
         nibabel("freesurfer", "write_maps").write_morph_data(target, inside[0])
 
@@ -161,7 +162,7 @@ def _refuse_both(path: Path, cortex: Cortex) -> None:
 
 
 def _colours(count: int) -> list[tuple[float, float, float]]:
-    """Return a colour for each of several parcels; neighbours in the list differ most."""
+    """Return a colour for each of some parcels, no two of them close."""
     return [
         colorsys.hsv_to_rgb(k * _HUE_STEP % 1.0, 0.45 + 0.5 * (k * _SATURATION_STEP % 1.0), _VALUE)
         for k in range(count)

@@ -920,8 +920,8 @@ class DistanceField:
         Notes
         -----
         A field that is fast, does not retain its windows, or has a limit, sweeps again.
-        O(F + windows), and O(length of all paths): ten to eighteen times as long as a sweep without
-        a limit.
+        O(F + windows + faces that the straight lines of all paths cross): about twenty times as
+        long as a sweep without a limit.
 
         Examples
         --------

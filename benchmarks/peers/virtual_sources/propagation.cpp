@@ -2,8 +2,8 @@
 // Kobbelt, "Geodesic Distance Computation via Virtual Source Propagation" (2021), for `scripts/bench
 // virtual-sources`. Each face keeps one virtual source: a place in its plane from which it seems to
 // be lit, and what the way to there has cost. It takes another when that is nearer to its centre.
-// Faces wait in the order in which they come, in rounds of one mean edge. What their heuristic
-// decides at bends is decided by the nearer end of the edge.
+// Faces wait in the order in which they come, in rounds of one mean edge. A way that passes beside
+// the edge bends at that end of it; their heuristic for bends is left out.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>

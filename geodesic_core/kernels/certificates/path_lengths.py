@@ -9,7 +9,8 @@ A segment is d1·e + d2·f, by the differences of two weights of its ends, which
 and the edges e and f at the face's first corner. Let u be the rounding of an operation and S the
 sum of |ex|, |fx| and |fy|. Then 1 - s is off by u, a difference by 3 u, a coordinate of the segment
 by 5 u S, and the square root of the squares by 4 u S. Together that is less than `ROUNDED` · S, to
-which the errors of e and f are added.
+which the errors of e and f are added. Adding a line to the bound where it begins rounds once more,
+which the factor 1 + 4 u makes up for.
 """
 
 import math

@@ -226,7 +226,7 @@ export class Fields {
     }
   }
 
-  /** Paint the answers that are there; a mesh without any stays grey. */
+  /** Paint the answers that are there; a mesh without any shows its pieces. */
   paint(state: State): void {
     clearTimeout(this.clearing);
     this.clearing = 0;

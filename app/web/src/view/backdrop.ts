@@ -73,8 +73,8 @@ export class Backdrop {
   }
 
   /**
-   * Choose how smoothly edges of a mesh of so many faces are drawn. Without a graphics card, samples
-   * within pixels double the time of a large one.
+   * Choose how smoothly edges of a mesh of so many faces are drawn. Without a graphics card, a large
+   * mesh takes twice as long with several samples a pixel.
    */
   fit(faces: number): void {
     const samples = this.isSoftware && faces > MANY_FACES ? 0 : SAMPLES;
