@@ -24,10 +24,12 @@ from geodesic_core.kernels.front.state import (
     PREDECESSOR,
     SITE,
     WIDTH,
+    WINNER,
     Sites,
     Vertices,
     View,
     directed,
+    mirrors,
 )
 from geodesic_core.kernels.front.window import TURN, Window, turned
 from geodesic_core.kernels.jit import borrowed, inlined, kernel, pointers
@@ -93,6 +95,24 @@ def turns_at_site(geometry: Floats, sites: Sites, k: int, h: int) -> tuple[float
 
 
 @inlined
+def lit_from_vertex(wave: View, window: Window, v: int, h: int) -> Window:
+    """Return a window from vertex v, the tail of h, over the far edge of the face of h."""
+    if directed(wave):
+        is_source = wave.vertices.winner_ints[WINNER * v + ENTRY_EDGE] < 0
+        if is_source or wave.bounds.directed_from_bends:
+            return turned(window, turn_across_face(wave.mesh.geometry, h), 0)
+    return window
+
+
+@inlined
+def lit_from_site(wave: View, window: Window, k: int, h: int) -> Window:
+    """Return a window from the site of row k, over the edge h of its face."""
+    if directed(wave):
+        return turned(window, turns_at_site(wave.mesh.geometry, wave.sites, k, h)[1], 0)
+    return window
+
+
+@inlined
 def turns_to_sides(wave: View, h: int, count: int) -> tuple[float, float]:
     """Return the turns of the left and of the right edge of a face against h; 0 if not needed.
 
@@ -117,10 +137,19 @@ def turned_by(window: Window, turn: float) -> Window:
 
 
 @inlined
-def seen_in_mirror(window: Window) -> Window:
+def seen_in_mirror(wave: View, window: Window) -> Window:
     """Return the window, which `reversed_window` turned over, with its turn there."""
-    over = turned_by(window, math.pi)
-    return turned(over, over.turn, 1 - over.mirrored)
+    if mirrors(wave):
+        over = turned_by(window, math.pi)
+        return turned(over, over.turn, 1 - over.mirrored)
+    return window
+
+
+@inlined
+def note_direction(wave: View, node: int, window: Window) -> None:
+    """Note the turn of the window that reaches a node first. Modifies the node."""
+    if directed(wave):
+        wave.vertices.turn[node], wave.vertices.mirrored[node] = window.turn, window.mirrored
 
 
 @kernel

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
+from geodesic_core.kernels.front.directions import note_direction
 from geodesic_core.kernels.front.pruning import touch
 from geodesic_core.kernels.front.queues import push_or_raise
 from geodesic_core.kernels.front.state import (
@@ -17,7 +18,6 @@ from geodesic_core.kernels.front.state import (
     SETTLED,
     WINNER,
     View,
-    directed,
     merging,
 )
 from geodesic_core.kernels.front.window import Window
@@ -68,8 +68,7 @@ def relax_node(wave: View, node: int, distance: float, via: int, window: Window)
     record_winner(wave, node, via, window.sx, window.sy, root)
     if merging(wave):
         vertices.reference[node] = window.reference
-    if directed(wave):
-        vertices.turn[node], vertices.mirrored[node] = window.turn, window.mirrored
+    note_direction(wave, node, window)
     vertices.distance[node] = distance
     if is_vertex and distance < known:
         push_or_raise(wave.queues, wave.counters, node, distance)

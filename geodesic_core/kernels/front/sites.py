@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from geodesic_core.arrays import Floats, Ints
-from geodesic_core.kernels.front.directions import turns_at_site
+from geodesic_core.kernels.front.directions import lit_from_site
 from geodesic_core.kernels.front.segments import (
     distance_to_segment,
     is_off_edge,
@@ -30,14 +30,12 @@ from geodesic_core.kernels.front.state import (
     SITE,
     WINNER,
     View,
-    directed,
 )
 from geodesic_core.kernels.front.window import (
     Window,
     distance_at,
     emitted_window,
     straight_distance,
-    turned,
 )
 from geodesic_core.kernels.jit import kernel
 from geodesic_core.kernels.mesh.half_edges import (
@@ -113,8 +111,7 @@ def emit_site(wave: View, k: int, delivery: Delivery) -> None:
         if sites.weights[3 * k + (h + 2) % 3] > 0.0:  # it is off the edge
             sy = min(-y, -FLAT * length)
             window = emitted_window(wave, 0.0, length, length - x, sy, sigma, node, 0.0)
-            if directed(wave):
-                window = turned(window, turns_at_site(mesh.geometry, sites, k, h)[1], 0)
+            window = lit_from_site(wave, window, k, h)
             delivery.send_out(wave, mesh.links[row + OPPOSITE], h, window)
         ax = mesh.geometry[row + COS_LEFT] * mesh.geometry[row + LENGTH_LEFT]
         ay = mesh.geometry[row + SIN_LEFT] * mesh.geometry[row + LENGTH_LEFT]

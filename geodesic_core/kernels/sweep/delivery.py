@@ -5,7 +5,7 @@ from geodesic_core.kernels.front.directions import seen_in_mirror
 from geodesic_core.kernels.front.pool import free_window, put_window
 from geodesic_core.kernels.front.relaxation import bound_vertex, illuminate_vertex, relax_node
 from geodesic_core.kernels.front.sites import Delivery
-from geodesic_core.kernels.front.state import View, merging, mirrors, source_weight
+from geodesic_core.kernels.front.state import View, merging, source_weight
 from geodesic_core.kernels.front.window import (
     Window,
     is_beyond,
@@ -93,8 +93,7 @@ def send_across(wave: View, g: int, slot: int) -> None:
         copy = onward
         if mesh.links[ROW * h + TAIL] == mesh.links[ROW * g + TAIL]:
             copy = reversed_window(onward, mesh.geometry[ROW * g + LENGTH])
-            if mirrors(wave):
-                copy = seen_in_mirror(copy)
+            copy = seen_in_mirror(wave, copy)
         insert_sorted(wave, h, put_window(wave, copy))
         wave.counters[CREATED] += 1
         queue_if_due(wave, h, mesh.links[ROW * h + TAIL], mesh.links[ROW * h + HEAD])

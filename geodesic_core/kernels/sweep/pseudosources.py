@@ -2,7 +2,7 @@
 
 import math
 
-from geodesic_core.kernels.front.directions import turn_across_face
+from geodesic_core.kernels.front.directions import lit_from_vertex
 from geodesic_core.kernels.front.pruning import may_pass
 from geodesic_core.kernels.front.relaxation import incoming_angle
 from geodesic_core.kernels.front.state import (
@@ -16,11 +16,10 @@ from geodesic_core.kernels.front.state import (
     SENT_TO,
     WINNER,
     View,
-    directed,
     merging,
     source_weight,
 )
-from geodesic_core.kernels.front.window import emitted_window, turned
+from geodesic_core.kernels.front.window import emitted_window
 from geodesic_core.kernels.jit import kernel
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
@@ -195,11 +194,7 @@ def emit_sector(wave: View, v: int, h: int, lo: float, hi: float, widest: float)
     if merging(wave):
         xi = vertices.upper[v] - sigma
     window = emitted_window(wave, b0, b1, sx, sy, sigma, v, xi)
-    if directed(wave):
-        is_source = vertices.winner_ints[WINNER * v + ENTRY_EDGE] < 0
-        if is_source or wave.bounds.directed_from_bends:
-            window = turned(window, turn_across_face(mesh.geometry, h), 0)
-    send_out(wave, across, following(h), window)
+    send_out(wave, across, following(h), lit_from_vertex(wave, window, v, h))
 
 
 @kernel
