@@ -66,29 +66,29 @@ def cover_of(mesh: TriangleMesh, across: Longs, kept: NDArray[np.bool_], control
     from scipy.sparse.csgraph import connected_components
 
     links, geometry = mesh.topology.links, mesh.topology.geometry
-    sheets, count = across.shape
+    sheets, faces = len(across), np.flatnonzero(kept)
     control.checkpoint(0.0)
-    control.check_memory(sheets * mesh.nbytes)
-    faces = np.flatnonzero(kept)
-    opposite = links[:, OPPOSITE].astype(np.int64)
-    inner = np.flatnonzero(kept[np.arange(count) // 3] & (opposite >= 0))
-    inner = inner[kept[opposite[inner] // 3]]
+    control.check_memory(sheets * len(faces) * mesh.nbytes // len(kept))
+    half_edges = (3 * faces[:, None] + np.arange(3)).reshape(-1)
+    count = len(half_edges)
+    opposite = links[half_edges, OPPOSITE].astype(np.int64)
+    inner = np.flatnonzero((opposite >= 0) & kept[opposite // 3])
+    beyond = 3 * np.searchsorted(faces, opposite[inner] // 3) + opposite[inner] % 3
     sheet = np.repeat(np.arange(sheets), len(inner))
-    h = np.tile(inner, sheets)
-    there = across[sheet, h]
-    sheet, h, there = (each[there >= 0] for each in (sheet, h, there))
+    h, opposite = np.tile(inner, sheets), np.tile(beyond, sheets)
+    there = across[sheet, half_edges[h]]
+    sheet, h, opposite, there = (each[there >= 0] for each in (sheet, h, opposite, there))
     # The tail of a half-edge is the head of its opposite: two corners of one vertex
-    ends = sheet * count + h, there * count + _following(opposite[h])
+    ends = sheet * count + h, there * count + _following(opposite)
     graph = coo_array((np.ones(len(h), np.int8), ends), shape=(sheets * count,) * 2)
     _, vertex_of = connected_components(graph, directed=False)
-    copies = (np.arange(sheets)[:, None] * (count // 3) + faces).reshape(-1)
-    corners = 3 * copies[:, None] + np.arange(3)
-    _, first, cover_faces = np.unique(vertex_of[corners], return_index=True, return_inverse=True)
-    cover_faces = cover_faces.reshape(-1, 3)
-    below = mesh.topology.outer_vertex[links[corners.reshape(-1)[first] % count, TAIL]]
+    _, first = np.unique(vertex_of, return_index=True)
+    cover_faces = vertex_of.reshape(-1, 3)
+    copies = (np.arange(sheets)[:, None] * len(kept) + faces).reshape(-1)
+    below = mesh.topology.outer_vertex[links[half_edges[first % count], TAIL]]
     if mesh.lengths is None:
         return Cover(mesh, TriangleMesh(mesh.vertices[below], cover_faces), copies)
-    lengths = geometry[corners % count, LENGTH]
+    lengths = np.tile(geometry[half_edges, LENGTH].reshape(-1, 3), (sheets, 1))
     vertices = mesh.vertices[below] if mesh.has_positions else None
     return Cover(mesh, TriangleMesh.from_lengths(cover_faces, lengths, vertices), copies)
 
