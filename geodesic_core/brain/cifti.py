@@ -3,22 +3,18 @@
 import json
 from collections.abc import Sequence
 from functools import reduce
-from importlib import import_module
 from operator import add
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Longs
+from geodesic_core.brain.files import kind_of, nibabel, reading
 from geodesic_core.brain.structures import Structure
 from geodesic_core.errors import InvalidArgument
-from geodesic_core.extras import extra
 from geodesic_core.matrices.formats import Facts
-
-if TYPE_CHECKING:
-    from geodesic_core.brain.parcellation import Parcellation
 
 INTENTS = {
     ".dconn.nii": "ConnDense",
@@ -32,32 +28,6 @@ INTENTS = {
 """By suffix, the name of what a file holds, as NIfTI spells it"""
 
 
-def nibabel(module: str, call: str) -> Any:
-    """Return a module of nibabel, of whose types little is declared.
-
-    Raises
-    ------
-    MissingExtra
-        It is not installed.
-    """
-    with extra("brain", "nibabel", call):
-        return import_module(f"nibabel.{module}")
-
-
-def kind_of(path: Path, wanted: Sequence[str]) -> str:
-    """Return the suffix of a path that is one of some kinds, such as ``.dconn.nii``.
-
-    Raises
-    ------
-    InvalidArgument
-        It ends in none of them.
-    """
-    for kind in wanted:
-        if path.name.lower().endswith(kind):
-            return kind
-    raise InvalidArgument(f"{path} must end in {', '.join(wanted)}")
-
-
 def brain_models(structures: Sequence[Structure], vertices: Longs) -> Any:
     """Return the axis of some vertices, ascending, each by its structure."""
     axis = nibabel("cifti2", "writing CIFTI").BrainModelAxis
@@ -67,16 +37,6 @@ def brain_models(structures: Sequence[Structure], vertices: Longs) -> Any:
         if len(ids := each.of(vertices))
     ]
     return reduce(add, models)
-
-
-def parcels_axis(structures: Sequence[Structure], parcels: "Parcellation") -> Any:
-    """Return the axis of parcels."""
-    return nibabel("cifti2", "writing CIFTI").ParcelsAxis.from_brain_models(
-        [
-            (name, brain_models(structures, np.flatnonzero(parcels.parcel_of == k)))
-            for k, name in enumerate(parcels.names)
-        ]
-    )
 
 
 def write_cifti(
@@ -146,7 +106,8 @@ def load_matrix(source: str | Path) -> BrainMatrix:
     """
     path = Path(source)
     kind_of(path, [kind for kind in INTENTS if "conn" in kind])
-    image = open_cifti(path)
+    with reading(path, "CIFTI-2 file"):
+        image = nibabel("cifti2", "load_matrix").Cifti2Image.from_filename(path)
     axes = [image.header.get_axis(i) for i in range(2)]
     if not all(hasattr(axis, "nvertices") for axis in axes):
         raise InvalidArgument(f"{path} is no matrix of vertices or parcels")
@@ -155,31 +116,13 @@ def load_matrix(source: str | Path) -> BrainMatrix:
     return BrainMatrix(values, _ids(axes[0]), _ids(axes[1]), json.loads(facts))
 
 
-def open_cifti(path: Path) -> Any:
-    """Return the image of a file.
-
-    Raises
-    ------
-    InvalidArgument
-        It cannot be read.
-    """
-    image = nibabel("cifti2", "reading CIFTI").Cifti2Image
-    try:
-        return image.from_filename(path)
-    except Exception as error:  # any failure of a parser
-        what = " ".join(str(error).split())[:200] or type(error).__name__
-        raise InvalidArgument(f"{path} is no CIFTI-2 file: {what}") from error
-
-
 def _ids(axis: Any) -> list[tuple[str, Longs]] | list[str]:
     if hasattr(axis, "iter_structures"):
         return [
-            (_gifti_name(name), np.asarray(model.vertex, np.int64))
+            (
+                name.removeprefix("CIFTI_STRUCTURE_").title().replace("_", ""),
+                np.asarray(model.vertex, np.int64),
+            )
             for name, _, model in axis.iter_structures()
         ]
     return [str(name) for name in axis.name]
-
-
-def _gifti_name(cifti_name: str) -> str:
-    words = cifti_name.removeprefix("CIFTI_STRUCTURE_").split("_")
-    return "".join(word.title() for word in words)

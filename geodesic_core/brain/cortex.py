@@ -2,22 +2,22 @@
 
 import hashlib
 import warnings
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats, Longs
-from geodesic_core.brain.maps import Maps, MapSource, read_maps
+from geodesic_core.brain.maps import Maps, MapSource, read_maps, read_values
 from geodesic_core.brain.structures import Side, Structure, side_of_file, side_of_image
 from geodesic_core.control import Control
-from geodesic_core.errors import BlockedSource, InvalidArgument, NoSuchLabel, OtherSurface
+from geodesic_core.errors import BlockedSource, InvalidArgument, NoSuchLabel
+from geodesic_core.io.annotation import check_vertices
 from geodesic_core.io.as_mesh import as_mesh, join_meshes
-from geodesic_core.io.load import load_mesh
 from geodesic_core.io.unpacking import read_unpacked
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.mesh.vertex_areas import vertex_areas, with_vertex_areas
@@ -62,14 +62,13 @@ class Cortex:
     @cached_property
     def facts(self) -> dict[str, Any]:
         """What a file tells of it: units, wall, and the vertices of the region by structure."""
-        inside = {s.name: self.region_of(s).tolist() for s in self.structures}
         return {
             "units": "mm",
             "wall": self.wall,
             "structures": {
                 s.name: {"first": s.first, "vertices": s.count} for s in self.structures
             },
-            "region": inside,
+            "region": {s.name: self.region_of(s).tolist() for s in self.structures},
             "corrected_areas": self.corrected_areas,
         }
 
@@ -114,15 +113,6 @@ class Cortex:
         """
         structure = next(s for s in self.structures if s.part.start <= vertex < s.part.stop)
         return f"vertex {vertex - structure.first} of the {structure.side} surface"
-
-
-def as_values(values: ArrayLike, cortex: Cortex) -> Floats:
-    """Return values at the vertices of a cortex, (V,) or (M, V) float64, or refuse others."""
-    given, count = np.asarray(values, np.float64), len(cortex.mesh.vertices)
-    if given.ndim not in (1, 2) or given.shape[-1] != count:
-        message = f"the values have shape {given.shape}, for {count} vertices"
-        raise OtherSurface(message, given.size, count)
-    return given
 
 
 def load_cortex(
@@ -190,7 +180,7 @@ def load_cortex(
     >>> bool(len(cortex.region) == front.sum())
     True
     """
-    meshes = dict(_meshes_by_side(surfaces))
+    meshes = _meshes_by_side(surfaces)
     structures, first = [], 0
     for side, mesh in meshes.items():
         structures.append(Structure(side, first, len(mesh.vertices), len(mesh.faces)))
@@ -198,8 +188,7 @@ def load_cortex(
     mesh = join_meshes(list(meshes.values()))
     areas, digest = vertex_areas(mesh), None
     if corrected_areas is not None:
-        maps = read_maps(corrected_areas, structures)
-        corrected = np.concatenate([each.values[0] for each in maps])
+        corrected = read_values(corrected_areas, structures)[0]
         mesh = with_vertex_areas(mesh, areas, corrected)
         areas, digest = corrected, hashlib.sha256(corrected.tobytes()).hexdigest()
     if (roi is None) != (wall is None):
@@ -218,29 +207,26 @@ def load_cortex(
     return _walled(cortex) if wall == "blocks" else cortex
 
 
-def _meshes_by_side(surfaces: Any) -> Iterator[tuple[Side, TriangleMesh]]:
+def _meshes_by_side(surfaces: Any) -> dict[Side, TriangleMesh]:
     parts = getattr(getattr(surfaces, "mesh", surfaces), "parts", surfaces)  # of nilearn
-    if isinstance(parts, Mapping) and set(parts) <= {"left", "right"}:
-        for side, surface in parts.items():
-            yield side, as_mesh(surface)
-        return
-    several = list(surfaces) if isinstance(surfaces, list | tuple) else [surfaces]
-    if len(several) > 2 or (len(several) == 2 and np.ndim(several[0]) > 0):
-        several = [surfaces]  # arrays of one mesh
-    sides = [_side_of(each) for each in several]
-    for side, surface in zip(sides, several, strict=True):
-        if side is None or sides.count(side) > 1:
+    if not (isinstance(parts, Mapping) and set(parts) <= {"left", "right"}):
+        several = list(surfaces) if isinstance(surfaces, list | tuple) else [surfaces]
+        if len(several) > 2 or (len(several) == 2 and np.ndim(several[0]) > 0):
+            several = [surfaces]  # arrays of one mesh
+        parts = {_side_of(each): each for each in several}
+        if len(parts) < len(several) or None in parts:
+            unknown = parts.get(None)
+            what = unknown if isinstance(unknown, str | Path) else "each"
             raise InvalidArgument(
-                f"which hemisphere is {surface if isinstance(surface, str | Path) else 'each'}? "
-                "Neither metadata nor name tell: give {'left': …, 'right': …}"
+                f"which hemisphere is {what}? Neither metadata nor name tell: "
+                "give {'left': …, 'right': …}"
             )
-        yield side, load_mesh(surface) if isinstance(surface, str | Path) else as_mesh(surface)
+    return {side: as_mesh(surface) for side, surface in parts.items()}
 
 
 def _side_of(surface: Any) -> Side | None:
     if isinstance(surface, str | Path):
-        file = read_unpacked(surface, ("gii",), None, Control())
-        return side_of_file(file)
+        return side_of_file(read_unpacked(surface, ("gii",), None, Control()))
     return side_of_image(surface) if hasattr(surface, "darrays") else None
 
 
@@ -248,12 +234,10 @@ def _region(roi: MapSource, structures: list[Structure]) -> Longs:
     total = sum(each.count for each in structures)
     if isinstance(roi, list) and all(isinstance(each, int | np.integer) for each in roi):
         roi = np.asarray(roi)
-    listed = roi if isinstance(roi, np.ndarray) else np.empty(0)
+    listed: NDArray[Any] = roi if isinstance(roi, np.ndarray) else np.empty(0)
     if listed.ndim == 1 and listed.dtype.kind in "iu" and len(listed) != total:
-        if listed.min(initial=0) < 0 or listed.max(initial=0) >= total:
-            raise OtherSurface(f"the roi lists vertices beyond {total - 1}", len(listed), total)
-        inside = np.zeros(total, bool)
-        inside[listed] = True
+        check_vertices(listed, total, "the roi")
+        inside = np.isin(np.arange(total), listed)
     else:
         maps = read_maps(roi, structures)
         inside = np.concatenate([is_labelled(each) for each in maps])
@@ -279,14 +263,11 @@ def _stands_for_none(name: str) -> bool:
 
 def _walled(cortex: Cortex) -> Cortex:
     """Return a cortex whose faces with a corner outside of the region are blocked."""
-    inside = np.zeros(len(cortex.mesh.vertices), bool)
-    inside[cortex.region] = True
-    is_free = inside[cortex.mesh.faces].all(axis=1)
+    faces = cortex.mesh.faces
+    is_free = np.isin(faces, cortex.region).all(axis=1)
     if not is_free.any():
         raise NoSuchLabel("no face has all of its corners in the roi: its wall would block all")
-    has_face = np.zeros(len(inside), bool)
-    has_face[cortex.mesh.faces[is_free]] = True
-    alone = np.flatnonzero(inside & ~has_face)
+    alone = np.setdiff1d(cortex.region, faces[is_free])
     if len(alone):
         warnings.warn(
             f"{len(alone)} vertices of the roi have no face inside of it, such as "
@@ -294,7 +275,4 @@ def _walled(cortex: Cortex) -> Cortex:
             BlockedSource,
             stacklevel=3,
         )
-    mesh = cortex.mesh.with_barriers(np.flatnonzero(~is_free)) if not is_free.all() else cortex.mesh
-    return Cortex(
-        mesh, cortex.structures, cortex.region, "blocks", cortex.areas, cortex.corrected_areas
-    )
+    return replace(cortex, mesh=cortex.mesh.with_barriers(np.flatnonzero(~is_free)))

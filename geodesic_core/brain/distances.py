@@ -8,8 +8,9 @@ from typing import Any, Literal
 
 from numpy.typing import NDArray
 
-from geodesic_core.brain.cifti import brain_models, kind_of, write_cifti
+from geodesic_core.brain.cifti import brain_models, write_cifti
 from geodesic_core.brain.cortex import Cortex
+from geodesic_core.brain.files import kind_of
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument
 from geodesic_core.fields.methods import Accuracy, Effort, Method

@@ -1,7 +1,7 @@
 """Files of values and labels at vertices: CIFTI-2, and GIFTI and FreeSurfer's of one hemisphere."""
 
 import colorsys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,14 +9,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geodesic_core.arrays import Floats
-from geodesic_core.brain.cifti import brain_models, kind_of, nibabel, write_cifti
-from geodesic_core.brain.cortex import Cortex, as_values
-from geodesic_core.brain.maps import MapSource, read_maps
+from geodesic_core.brain.cifti import INTENTS, brain_models, write_cifti
+from geodesic_core.brain.cortex import Cortex
+from geodesic_core.brain.files import kind_of, nibabel
+from geodesic_core.brain.gifti import LabelTable, write_gifti
+from geodesic_core.brain.maps import MapSource, read_values
 from geodesic_core.brain.parcellation import Parcellation
+from geodesic_core.brain.structures import only
 from geodesic_core.errors import InvalidArgument
 
 _METRICS = (".func.gii", ".shape.gii")
 _MORPHOMETRY = (".curv", ".sulc", ".thickness", ".area", ".volume")
+_REMEDY = "write CIFTI for both"
 _HUE_STEP, _SATURATION_STEP, _VALUE = 0.7548776662, 0.5698402910, 0.9
 """Of the colours of parcels: hue and saturation move on by these shares of their range, so that
 colours stay apart"""
@@ -51,7 +55,7 @@ def load_maps(source: MapSource, cortex: Cortex) -> Floats:
     >>> gc.brain.load_maps(file, cortex).shape
     (1, 42)
     """
-    return np.concatenate([each.values for each in read_maps(source, cortex.structures)], axis=1)
+    return read_values(source, cortex.structures)
 
 
 def write_maps(path: str | Path, cortex: Cortex, values: ArrayLike, names: Sequence[str]) -> None:
@@ -88,23 +92,17 @@ def write_maps(path: str | Path, cortex: Cortex, values: ArrayLike, names: Seque
     """
     target = Path(path)
     kind = kind_of(target, (".dscalar.nii", *_METRICS, *_MORPHOMETRY))
-    maps = np.atleast_2d(as_values(values, cortex)).astype(np.float32)
+    maps = read_values(np.asarray(values), cortex.structures).astype(np.float32)
     if len(names) != len(maps):
         raise InvalidArgument(f"there are {len(names)} names for {len(maps)} maps")
-    values = maps[:, cortex.region]
-    if kind == ".dscalar.nii":
-        axis = nibabel("cifti2", "write_maps").ScalarAxis(list(names))
-        axes = (axis, brain_models(cortex.structures, cortex.region))
-        write_cifti(target, kind, axes, values, cortex.facts)
-        return
-    _refuse_both(target, cortex)
     inside = np.zeros_like(maps)
-    inside[:, cortex.region] = values
-    if kind in _METRICS:
-        _write_gifti(target, cortex, inside, names, "NIFTI_INTENT_SHAPE")
+    inside[:, cortex.region] = maps[:, cortex.region]
+    if kind not in _MORPHOMETRY:
+        _write(target, kind, cortex, inside, names)
     elif len(maps) > 1:
         raise InvalidArgument(f"{path} holds one map: write GIFTI or CIFTI for {len(maps)} maps")
     else:
+        only(cortex.structures, path, _REMEDY)
         nibabel("freesurfer", "write_maps").write_morph_data(target, inside[0])
 
 
@@ -139,26 +137,35 @@ def write_labels(path: str | Path, parcels: Parcellation) -> None:
     target = Path(path)
     kind = kind_of(target, (".dlabel.nii", ".label.gii", ".annot"))
     cortex, count = parcels.cortex, len(parcels.names)
-    keys = parcels.keys if len(set(parcels.keys)) == count else tuple(range(1, count + 1))
-    if kind != ".dlabel.nii":
-        _refuse_both(target, cortex)
     if kind == ".annot":
+        only(cortex.structures, path, _REMEDY)
         _write_annotation(target, parcels)
         return
+    keys = parcels.keys if len(set(parcels.keys)) == count else tuple(range(1, count + 1))
     rows = zip(keys, parcels.names, _colours(count), strict=True)
     table = {0: ("???", (0.0,) * 4)} | {key: (name, (*colour, 1.0)) for key, name, colour in rows}
     labels = np.array([*keys, 0], np.int32)[parcels.parcel_of]
-    if kind == ".label.gii":
-        _write_gifti(target, cortex, labels[None], ["parcels"], "NIFTI_INTENT_LABEL", table)
+    _write(target, kind, cortex, labels[None], ["parcels"], table)
+
+
+def _write(
+    path: Path,
+    kind: str,
+    cortex: Cortex,
+    maps: NDArray[Any],
+    names: Sequence[str],
+    table: LabelTable | None = None,
+) -> None:
+    """Write maps, which are labels where there is a table, as CIFTI or as GIFTI."""
+    if kind in INTENTS:
+        cifti2 = nibabel("cifti2", "writing CIFTI")
+        axis = cifti2.LabelAxis(names, [table]) if table else cifti2.ScalarAxis(list(names))
+        axes = (axis, brain_models(cortex.structures, cortex.region))
+        write_cifti(path, kind, axes, maps[:, cortex.region].astype(np.float32), cortex.facts)
         return
-    axis = nibabel("cifti2", "write_labels").LabelAxis(["parcels"], [table])
-    axes = (axis, brain_models(cortex.structures, cortex.region))
-    write_cifti(target, kind, axes, labels[None, cortex.region].astype(np.float32), cortex.facts)
-
-
-def _refuse_both(path: Path, cortex: Cortex) -> None:
-    if len(cortex.structures) > 1:
-        raise InvalidArgument(f"{path} holds one hemisphere: write CIFTI for both")
+    intent = "NIFTI_INTENT_LABEL" if table else "NIFTI_INTENT_SHAPE"
+    arrays = [(values, intent, {"Name": name}) for values, name in zip(maps, names, strict=True)]
+    write_gifti(path, only(cortex.structures, path, _REMEDY), arrays, table)
 
 
 def _colours(count: int) -> list[tuple[float, float, float]]:
@@ -175,25 +182,3 @@ def _write_annotation(path: Path, parcels: Parcellation) -> None:
     table = np.pad(colours, ((1, 0), (0, 1)))  # black stands for none, and nothing is transparent
     write = nibabel("freesurfer", "write_labels").write_annot
     write(path, parcels.parcel_of + 1, table, ["unknown", *parcels.names], fill_ctab=True)
-
-
-def _write_gifti(
-    path: Path,
-    cortex: Cortex,
-    maps: NDArray[Any],
-    names: Sequence[str],
-    intent: str,
-    table: Mapping[int, tuple[str, tuple[float, ...]]] | None = None,
-) -> None:
-    gifti = nibabel("gifti.gifti", "writing GIFTI")
-    arrays = [
-        gifti.GiftiDataArray(values, intent, meta={"Name": name})
-        for values, name in zip(maps, names, strict=True)
-    ]
-    image = gifti.GiftiImage(darrays=arrays)
-    image.meta["AnatomicalStructurePrimary"] = cortex.structures[0].name
-    for key, (name, colour) in (table or {}).items():
-        label = gifti.GiftiLabel(key, *colour)
-        label.label = name
-        image.labeltable.labels.append(label)
-    image.to_filename(path)

@@ -1,7 +1,7 @@
 """Values and labels at the vertices of hemispheres, from files and from objects."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from io import StringIO
+from io import BytesIO, StringIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -9,16 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats
-from geodesic_core.brain.cifti import nibabel, open_cifti
-from geodesic_core.brain.structures import Structure, side_of_image
+from geodesic_core.brain.files import nibabel, reading
+from geodesic_core.brain.structures import Structure, only, side_of_image
 from geodesic_core.control import Control
-from geodesic_core.errors import GeodesicError, InvalidArgument, InvalidMesh, OtherSurface
+from geodesic_core.errors import InvalidArgument, OtherSurface
 from geodesic_core.io.annotation import read_annotation
 from geodesic_core.io.label import read_label
-from geodesic_core.io.unpacking import NamedBytes, read_unpacked
+from geodesic_core.io.unpacking import read_unpacked
 
-Table = Mapping[int, str]
-"""The name of each label by its number"""
 MapSource = Any
 """A path; an array; an image of nibabel or nilearn; or one of them for each hemisphere, in their
 order or by side"""
@@ -29,10 +27,8 @@ class Maps(NamedTuple):
 
     values: Floats
     """(M, n): of each map; NaN where it has none"""
-    names: tuple[str, ...]
-    """(M,)"""
-    table: Table | None
-    """Where the values are labels"""
+    table: Mapping[int, str] | None = None
+    """The name of each label by its number, where the values are labels"""
 
 
 def read_maps(source: MapSource, structures: Sequence[Structure]) -> list[Maps]:
@@ -53,6 +49,11 @@ def read_maps(source: MapSource, structures: Sequence[Structure]) -> list[Maps]:
     if len(set(counts)) > 1:
         raise InvalidArgument(f"the hemispheres have {' and '.join(counts)} maps")
     return maps
+
+
+def read_values(source: MapSource, structures: Sequence[Structure]) -> Floats:
+    """Return the values of each map at the vertices of all structures, (M, V)."""
+    return np.concatenate([each.values for each in read_maps(source, structures)], axis=1)
 
 
 def _checked(maps: Maps, structure: Structure) -> Maps:
@@ -84,64 +85,47 @@ def _by_structure(source: MapSource, structures: Sequence[Structure]) -> list[Ma
     if isinstance(source, str | Path):
         return _read(Path(source), structures)
     if hasattr(source, "darrays"):
-        return [_gifti(source, _only(structures))]
+        return [_gifti(source, only(structures, "it", _REMEDY))]
     if hasattr(source, "nifti_header"):
         return list(_cifti(source, structures))
     if hasattr(source, "mesh") and hasattr(source, "data"):  # nilearn's SurfaceImage
         parts = source.data.parts
-        return [Maps(np.atleast_2d(_floats(parts[s.side]).T), (), None) for s in structures]
-    return _split(_floats(source), structures)
+        return [Maps(_rows(np.transpose(parts[each.side]))) for each in structures]
+    return _split(_rows(source), structures)
 
 
-def _floats(values: Any) -> Floats:
+def _rows(values: Any) -> Floats:
+    """Return values as a row for each map."""
     try:
-        return np.asarray(values, np.float64)
+        rows = np.atleast_2d(np.asarray(values, np.float64))
     except (TypeError, ValueError) as error:
         raise InvalidArgument(f"a {type(values).__name__} holds no values by vertex") from error
+    if rows.ndim > 2:
+        raise InvalidArgument(f"values have shape {rows.shape}; it must be (n,) or (M, n)")
+    return rows
 
 
-def _only(structures: Sequence[Structure]) -> Structure:
-    if len(structures) > 1:
-        raise InvalidArgument("it holds one hemisphere: give a file for each surface")
-    return structures[0]
-
-
-def _split(values: Floats, structures: Sequence[Structure]) -> list[Maps]:
+def _split(rows: Floats, structures: Sequence[Structure]) -> list[Maps]:
     """Return the values of structures that follow each other."""
-    rows = np.atleast_2d(values)
     ends = np.cumsum([each.count for each in structures])
     if len(structures) > 1 and rows.shape[1] != ends[-1]:
         found, count = rows.shape[1], int(ends[-1])
         what = f"there are {found} values, but the surfaces have {count} vertices"
         raise OtherSurface(what, found, count)
-    parts = np.split(rows, ends[:-1], axis=1)
-    return [Maps(part, (), None) for part in parts]
+    return [Maps(part) for part in np.split(rows, ends[:-1], axis=1)]
 
 
 def _read(path: Path, structures: Sequence[Structure]) -> list[Maps]:
     """Read a file by its suffix; one of no known suffix has values of FreeSurfer."""
-    try:
-        file = read_unpacked(path, _READERS, None, Control())
-    except InvalidMesh as error:
-        raise InvalidArgument(str(error)) from error
-    try:
-        if file.suffix == "nii":
-            return list(_cifti(open_cifti(path), structures))
-        if file.suffix in _TABLES:
-            return _split(_TABLES[file.suffix](file), structures)
-        read = _READERS.get(file.suffix, _morphometry)
-        return [read(file, path, _only(structures))]
-    except GeodesicError as error:
-        error.args = (f"{path}: {error}",)
-        raise
-    except Exception as error:  # any failure of a parser
-        what = " ".join(str(error).split())[:200] or type(error).__name__
-        raise InvalidArgument(f"{path} is no file of values at vertices: {what}") from error
-
-
-def _gifti_file(file: NamedBytes, _path: Path, structure: Structure) -> Maps:
-    image = nibabel("gifti.gifti", "reading GIFTI").GiftiImage.from_bytes(file.data)
-    return _gifti(image, structure)
+    with reading(path, "file of values at vertices"):
+        file = read_unpacked(path, {*_OPENERS, *_OF_ONE}, None, Control())
+        if file.suffix in _OPENERS:
+            return _by_structure(_OPENERS[file.suffix](file.data), structures)
+        structure = only(structures, "it", _REMEDY)
+        if file.suffix in _OF_ONE:
+            return [_OF_ONE[file.suffix](file.data, structure)]
+        values = nibabel("freesurfer", "reading values of FreeSurfer").read_morph_data(path)
+        return [Maps(_rows(values))]
 
 
 def _gifti(image: Any, structure: Structure) -> Maps:
@@ -152,17 +136,15 @@ def _gifti(image: Any, structure: Structure) -> Maps:
     if not arrays or any(len(array) != len(arrays[0]) for array in arrays):
         raise InvalidArgument("it holds no values at vertices")
     columns = np.concatenate([array.reshape(len(array), -1) for array in arrays], axis=1)
-    names = tuple(str(array.meta.get("Name", "")) for array in image.darrays)
     table = image.labeltable.get_labels_as_dict() if image.labeltable.labels else None
     is_label = image.darrays[0].intent == _LABEL_INTENT
-    return Maps(columns.T.astype(np.float64), names, table if is_label else None)
+    return Maps(columns.T.astype(np.float64), table if is_label else None)
 
 
 def _cifti(image: Any, structures: Sequence[Structure]) -> Iterator[Maps]:
     """Yield the maps of each structure: of its brain model, or of the parcels in it."""
     rows, columns = (image.header.get_axis(i) for i in range(2))
     values = np.asarray(image.dataobj, np.float64)
-    names = tuple(map(str, getattr(rows, "name", ())))
     table = None
     if hasattr(rows, "label"):  # one table for each map
         table = {key: name for labels in rows.label for key, (name, _) in labels.items()}
@@ -173,7 +155,7 @@ def _cifti(image: Any, structures: Sequence[Structure]) -> Iterator[Maps]:
         maps = np.full((len(values), int(declared)), np.nan)
         for vertices, part in _places(columns, structure.cifti_name):
             maps[:, vertices] = values[:, part]
-        yield Maps(maps, names, table)
+        yield Maps(maps, table)
 
 
 def _places(axis: Any, name: str) -> Iterator[tuple[NDArray[np.integer[Any]], Any]]:
@@ -188,40 +170,39 @@ def _places(axis: Any, name: str) -> Iterator[tuple[NDArray[np.integer[Any]], An
                 yield vertices[name], slice(column, column + 1)
 
 
-def _annot(file: NamedBytes, _path: Path, structure: Structure) -> Maps:
-    codes, table = read_annotation(file.data, structure.count)
+def _annot(data: bytes, structure: Structure) -> Maps:
+    codes, table = read_annotation(data, structure.count)
     values = np.full(structure.count, np.nan)
     for number, (_, code) in table.items():
         values[codes == code] = number
-    names = {number: name for number, (name, _) in table.items()}
-    return Maps(values[None], ("",), names)
+    return Maps(values[None], {number: name for number, (name, _) in table.items()})
 
 
-def _label(file: NamedBytes, _path: Path, structure: Structure) -> Maps:
-    inside = read_label(file.data, structure.count)
-    return Maps(inside[None].astype(np.float64), ("",), None)
+def _label(data: bytes, structure: Structure) -> Maps:
+    return Maps(read_label(data, structure.count)[None].astype(np.float64))
 
 
-def _morphometry(_file: NamedBytes, path: Path, _structure: Structure) -> Maps:
-    values = nibabel("freesurfer", "reading values of FreeSurfer").read_morph_data(path)
-    return Maps(np.asarray(values, np.float64)[None], (path.suffix[1:],), None)
+def _open_image(module: str, image: str) -> Callable[[bytes], Any]:
+    return lambda data: getattr(nibabel(module, "reading values"), image).from_bytes(data)
 
 
-def _npy(file: NamedBytes) -> Floats:
-    from io import BytesIO
-
-    return _floats(np.load(BytesIO(file.data), allow_pickle=False))
+def _open_numpy(data: bytes) -> Any:
+    return np.load(BytesIO(data), allow_pickle=False)
 
 
-def _text(file: NamedBytes) -> Floats:
-    return _floats(np.loadtxt(StringIO(file.data.decode()), delimiter=",", ndmin=2).T)
+def _open_text(data: bytes) -> Any:
+    return np.loadtxt(StringIO(data.decode()), delimiter=",", ndmin=2).T
 
 
+_REMEDY = "give a file for each surface"
 _LABEL_INTENT = 1002
-_TABLES = {"npy": _npy, "csv": _text, "txt": _text}
-"""Files of values alone, which may be those of all surfaces"""
-_READERS: Mapping[str, Callable[[NamedBytes, Path, Structure], Maps]] = {
-    "gii": _gifti_file,
-    "annot": _annot,
-    "label": _label,
+_OPENERS: Mapping[str, Callable[[bytes], Any]] = {
+    "gii": _open_image("gifti.gifti", "GiftiImage"),
+    "nii": _open_image("cifti2", "Cifti2Image"),
+    "npy": _open_numpy,
+    "csv": _open_text,
+    "txt": _open_text,
 }
+"""What makes a file an object that is read as one that is given"""
+_OF_ONE: Mapping[str, Callable[[bytes, Structure], Maps]] = {"annot": _annot, "label": _label}
+"""What reads files of one hemisphere that need its number of vertices"""

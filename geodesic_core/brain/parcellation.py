@@ -1,6 +1,7 @@
 """Parcels of a cortex, from files of labels."""
 
 import warnings
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,10 +40,8 @@ class Parcellation:
     @property
     def areas(self) -> Floats:
         """(P,) mm²: the sum of the areas of its vertices."""
-        inside = self.parcel_of >= 0
-        areas = self.cortex.areas[inside]
-        sums = np.bincount(self.parcel_of[inside], areas, minlength=len(self.names))
-        return sums.astype(np.float64)
+        sums = np.bincount(self.parcel_of + 1, self.cortex.areas, minlength=1 + len(self.names))
+        return sums[1:].astype(np.float64)  # the first is that of no parcel
 
     def borders(self) -> list[list[SurfaceCurve]]:
         """Return the border of each parcel: lines halfway between its vertices and others.
@@ -115,8 +114,6 @@ def load_parcels(labels: MapSource, cortex: Cortex) -> Parcellation:
     """
     maps = read_maps(labels, cortex.structures)
     is_shared = len(maps) > 1 and maps[0].table is not None and maps[0].table is maps[1].table
-    inside = np.zeros(len(cortex.mesh.vertices), bool)
-    inside[cortex.region] = True
     groups: dict[tuple[int, int], Longs] = {}
     for k, (each, structure) in enumerate(zip(maps, cortex.structures, strict=True)):
         labelled = np.flatnonzero(is_labelled(each))
@@ -125,7 +122,7 @@ def load_parcels(labels: MapSource, cortex: Cortex) -> Parcellation:
             group = (0 if is_shared else k, key)
             vertices = structure.first + labelled[keys == key]
             groups[group] = np.concatenate([groups.get(group, vertices[:0]), vertices])
-    kept = {group: vertices[inside[vertices]] for group, vertices in groups.items()}
+    kept = {group: np.intersect1d(vertices, cortex.region) for group, vertices in groups.items()}
     names = _names_of(list(groups), maps, cortex)
     empty = [names[group] for group, vertices in kept.items() if not len(vertices)]
     if len(empty) == len(groups):
@@ -133,7 +130,7 @@ def load_parcels(labels: MapSource, cortex: Cortex) -> Parcellation:
     if empty:
         message = f"{len(empty)} parcels have no vertex in the region: {', '.join(empty[:5])}"
         warnings.warn(message, EmptyParcel, stacklevel=2)
-    parcel_of = np.full(len(inside), -1)
+    parcel_of = np.full(len(cortex.areas), -1)
     filled = [group for group, vertices in kept.items() if len(vertices)]
     for number, group in enumerate(filled):
         parcel_of[kept[group]] = number
@@ -146,15 +143,11 @@ def _names_of(
     groups: list[tuple[int, int]], maps: list[Maps], cortex: Cortex
 ) -> dict[tuple[int, int], str]:
     """Return a name for each group of vertices, of a surface and a label; no two the same."""
-    plain = {(k, key): (maps[k].table or {}).get(key, str(key)) for k, key in groups}
-    given = list(plain.values())
-    letters = [each.side[0].upper() for each in cortex.structures]
-    named = {
-        group: name if given.count(name) == 1 else f"{letters[group[0]]}_{name}"
-        for group, name in plain.items()
-    }
-    twice = list(named.values())
-    return {
-        group: name if twice.count(name) == 1 else f"{name}_{group[1]}"
-        for group, name in named.items()
-    }
+    names = {(k, key): (maps[k].table or {}).get(key, str(key)) for k, key in groups}
+    for longer in ("{side}_{name}", "{name}_{key}"):
+        given = Counter(names.values())
+        for k, key in groups:
+            name, side = names[k, key], cortex.structures[k].side[0].upper()
+            if given[name] > 1:
+                names[k, key] = longer.format(side=side, name=name, key=key)
+    return names

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats, Longs
-from geodesic_core.brain.cifti import brain_models, nibabel, parcels_axis, write_cifti
+from geodesic_core.brain.cifti import brain_models, write_cifti
+from geodesic_core.brain.files import nibabel
 from geodesic_core.brain.map_files import write_labels
 from geodesic_core.brain.parcellation import Parcellation
 from geodesic_core.control import Control
@@ -27,8 +28,6 @@ from geodesic_core.search.workspace import Workspace
 
 _ARRAYS = "parcels.npz"
 """Name of the file with all arrays; beside it lies what is finished"""
-_FOUND = ("mean", "least", "centroid", "centroids", "vertices", "vertex_mean")
-"""Those of `ParcelDistances`"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,15 +134,11 @@ def parcel_distances(
     out = Path(folder)
     out.mkdir(exist_ok=True)
     mesh = parcels.cortex.mesh
-    named = {"parcels": parcels.names, "keys": parcels.keys}
-    places = {"parcel_of": parcels.parcel_of.tolist()}
-    facts = facts_of(mesh, accuracy, np.inf, parcels.cortex.facts | named | places)
+    own = {"parcels": parcels.names, "keys": parcels.keys, "parcel_of": parcels.parcel_of.tolist()}
+    facts = facts_of(mesh, accuracy, np.inf, parcels.cortex.facts | own)
     sums = GroupSums(parcels.parcel_of, len(parcels.names))
-    count = len(sums.order)
-    first, last = (
-        control.for_part(done, count + sums.groups, some)
-        for done, some in ((0, count), (count, sums.groups))
-    )
+    count, parts = len(sums.order), len(sums.order) + sums.groups
+    first, last = control.for_part(0, parts, count), control.for_part(count, parts, sums.groups)
     asked = (out / _ARRAYS, facts, accuracy, most, first)
     with group_rows(mesh, sums.order, sums.starts, *asked) as rows:
         for part in rows.parts:
@@ -167,9 +162,14 @@ def parcel_distances(
 
 def _write(found: ParcelDistances, out: Path, facts: dict[str, Any]) -> None:
     parcels = found.parcels
-    structures = parcels.cortex.structures
-    parcel, vertex = parcels_axis(structures, parcels), brain_models(structures, found.vertices)
-    area = nibabel("cifti2", "parcel_distances").ScalarAxis(["area"])
+    cifti2, structures = nibabel("cifti2", "parcel_distances"), parcels.cortex.structures
+    vertex, area = brain_models(structures, found.vertices), cifti2.ScalarAxis(["area"])
+    parcel = cifti2.ParcelsAxis.from_brain_models(
+        [
+            (name, brain_models(structures, np.flatnonzero(parcels.parcel_of == k)))
+            for k, name in enumerate(parcels.names)
+        ]
+    )
     tables: dict[str, tuple[tuple[Any, Any], NDArray[Any]]] = {
         "mean.pconn.nii": ((parcel, parcel), found.mean),
         "least.pconn.nii": ((parcel, parcel), found.least),
@@ -183,8 +183,8 @@ def _write(found: ParcelDistances, out: Path, facts: dict[str, Any]) -> None:
         write_cifti(out / name, kind, axes, values, facts)
         write_beside(out / name, facts | {"sha256": sha256_of(out / name)})
     write_labels(out / "parcels.dlabel.nii", parcels)
-    arrays: dict[str, Any] = {name: getattr(found, name) for name in _FOUND}
-    arrays |= {name: getattr(parcels, name) for name in ("parcel_of", "areas", "names")}
-    arrays["facts"] = json.dumps(facts).encode()
+    arrays = {name: each for name, each in vars(found).items() if isinstance(each, np.ndarray)}
+    arrays |= {name: np.array(getattr(parcels, name)) for name in ("parcel_of", "areas", "names")}
+    arrays["facts"] = np.array(json.dumps(facts).encode())
     np.savez(out / _ARRAYS, allow_pickle=False, **arrays)
     write_beside(out / _ARRAYS, facts | {"sha256": sha256_of(out / _ARRAYS)})

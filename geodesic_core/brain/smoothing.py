@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geodesic_core.arrays import Floats
-from geodesic_core.brain.cortex import Cortex, as_values
+from geodesic_core.brain.cortex import Cortex
+from geodesic_core.brain.maps import read_values
 from geodesic_core.errors import InvalidArgument
 from geodesic_core.matrices.gaussian import REACH, spread
 from geodesic_core.solvers import distance_matrix
@@ -81,8 +82,8 @@ def smooth(
     """
     if not (is_number(fwhm) and 0.0 < fwhm < math.inf):
         raise InvalidArgument(f"fwhm is {fwhm!r}; it must be a finite number above 0")
-    given = as_values(values, cortex)
-    inside = given[..., cortex.region]
+    given = read_values(np.asarray(values), cortex.structures)
+    inside = given[:, cortex.region]
     missing = np.argwhere(~np.isfinite(inside))
     if len(missing):
         vertex = int(cortex.region[missing[0, -1]])
@@ -100,6 +101,5 @@ def smooth(
         memory_limit=memory_limit,
     )
     smoothed = np.full(given.shape, np.nan)
-    areas = cortex.areas[cortex.region]
-    smoothed[..., cortex.region] = spread(near, areas, inside, sigma)
-    return smoothed
+    smoothed[:, cortex.region] = spread(near, cortex.areas[cortex.region], inside, sigma)
+    return smoothed.reshape(np.shape(values))

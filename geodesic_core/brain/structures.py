@@ -1,12 +1,16 @@
 """Hemispheres, as the formats of brain imaging name them."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from geodesic_core.arrays import Longs
+from geodesic_core.errors import InvalidArgument
 from geodesic_core.io.unpacking import NamedBytes
 
 Side = Literal["left", "right"]
@@ -15,8 +19,8 @@ _SIDES: Mapping[str, Side] = {
     **dict.fromkeys(("l", "lh", "left"), "left"),
     **dict.fromkeys(("r", "rh", "right"), "right"),
 }
-_STRUCTURE = "AnatomicalStructurePrimary"
-"""Name in the metadata of GIFTI"""
+STRUCTURE = "AnatomicalStructurePrimary"
+"""Name of a structure in the metadata of GIFTI"""
 _IN_GIFTI = re.compile(rb"AnatomicalStructurePrimary.{0,80}?Cortex(Left|Right)", re.DOTALL)
 
 
@@ -47,11 +51,24 @@ class Structure:
         """Its vertices."""
         return slice(self.first, self.first + self.count)
 
-    def of(self, vertices: Longs) -> Longs:
+    def of(self, vertices: NDArray[np.signedinteger[Any]]) -> Longs:
         """Return those of some vertices that it has, in its own numbers."""
-        own = vertices - self.first
+        own = vertices.astype(np.int64) - self.first
         inside: Longs = own[(own >= 0) & (own < self.count)]
         return inside
+
+
+def only(structures: Sequence[Structure], file: object, remedy: str) -> Structure:
+    """Return the one structure that a file holds.
+
+    Raises
+    ------
+    InvalidArgument
+        There are two.
+    """
+    if len(structures) > 1:
+        raise InvalidArgument(f"{file} holds one hemisphere: {remedy}")
+    return structures[0]
 
 
 def side_of_file(file: NamedBytes) -> Side | None:
@@ -69,5 +86,5 @@ def side_named(text: str) -> Side | None:
 def side_of_image(image: Any) -> Side | None:
     """Return the side that a GIFTI image of nibabel tells in its metadata."""
     tables = [image.meta, *(array.meta for array in image.darrays)]
-    names = {table[_STRUCTURE].removeprefix("Cortex") for table in tables if _STRUCTURE in table}
+    names = {table[STRUCTURE].removeprefix("Cortex") for table in tables if STRUCTURE in table}
     return side_named(names.pop()) if len(names) == 1 else None

@@ -63,11 +63,11 @@ def read_annotation(data: bytes, count: int) -> tuple[Longs, dict[int, tuple[str
     return codes, _table(integers) if has_table else {}
 
 
-def check_vertices(vertices: Longs, count: int) -> None:
-    """Refuse vertices that are not among the ``count`` of a mesh."""
+def check_vertices(vertices: Longs, count: int, source: str = "it") -> None:
+    """Refuse vertices from a source that are not among the ``count`` of a mesh."""
     wrong = vertices[(vertices < 0) | (vertices >= count)]
     if len(wrong):
-        message = f"it lists vertex {wrong[0]}, but the mesh has {count}"
+        message = f"{source} lists vertex {wrong[0]}, but the mesh has {count}"
         raise OtherSurface(message, int(vertices.max()) + 1, count)
 
 

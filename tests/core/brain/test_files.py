@@ -238,7 +238,7 @@ def test_what_belongs_to_another_surface_is_refused(surfaces, files, masks, tmp_
         gc.brain.load_cortex({"left": surfaces["left"]}, np.ones(320), "passes")
     with pytest.raises(gc.errors.OtherSurface, match="99 values, but the surfaces have 324"):
         gc.brain.load_cortex(surfaces, np.ones(99), "passes")
-    with pytest.raises(gc.errors.OtherSurface, match="beyond 323"):
+    with pytest.raises(gc.errors.OtherSurface, match="the roi lists vertex 324"):
         gc.brain.load_cortex(surfaces, [324], "passes")
     rows = "#!ascii label\n1\n162 0 0 0 0\n"
     (tmp_path / "x.label").write_text(rows)
