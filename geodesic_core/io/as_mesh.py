@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from geodesic_core.errors import InvalidMesh
 from geodesic_core.io.brain import surface_arrays
@@ -260,13 +260,38 @@ def _joined(parts: Iterable[Any]) -> TriangleMesh:
 
 
 def join_meshes(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
-    """Return meshes as one, in whose numbers the vertices of each follow those before."""
+    """Return meshes as one, in whose numbers the vertices of each follow those before.
+
+    Lengths and barriers stay.
+
+    Raises
+    ------
+    InvalidMesh
+        Lengths or positions are given for some of the meshes only.
+    """
     if len(meshes) == 1:
         return meshes[0]
-    firsts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
-    faces = [mesh.faces + first for mesh, first in zip(meshes, firsts[:-1], strict=True)]
+    ways = {(mesh.lengths is None, mesh.has_positions) for mesh in meshes}
+    if len(ways) > 1:
+        raise InvalidMesh(
+            "some parts are given by positions and others by lengths: give all in the same way"
+        )
     vertices = np.concatenate([mesh.vertices for mesh in meshes])
-    return TriangleMesh(vertices, np.concatenate(faces))
+    faces = _numbered([mesh.faces for mesh in meshes], [len(mesh.vertices) for mesh in meshes])
+    lengths = [mesh.lengths for mesh in meshes if mesh.lengths is not None]
+    if lengths:
+        positions = vertices if meshes[0].has_positions else None
+        joined = TriangleMesh.from_lengths(faces, np.concatenate(lengths), positions)
+    else:
+        joined = TriangleMesh(vertices, faces)
+    barriers = _numbered([mesh.barriers for mesh in meshes], [len(mesh.faces) for mesh in meshes])
+    return joined.with_barriers(barriers)
+
+
+def _numbered(ids: Sequence[NDArray[Any]], counts: Sequence[int]) -> NDArray[Any]:
+    """Return ids of several parts one after the other, where each part has so many."""
+    firsts = np.cumsum([0, *counts[:-1]])
+    return np.concatenate([part + first for part, first in zip(ids, firsts, strict=True)])
 
 
 def _from_attributes(vertices: str, faces: str) -> Callable[[Any], TriangleMesh]:

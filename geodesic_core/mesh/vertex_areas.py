@@ -30,5 +30,7 @@ def with_vertex_areas(mesh: TriangleMesh, own: Floats, corrected: Floats) -> Tri
         raise InvalidArgument("corrected areas must be finite numbers above 0, at each vertex")
     ends = mesh.faces, np.roll(mesh.faces, -1, axis=1)
     before, after = (sum(np.sqrt(areas[corner]) for corner in ends) for areas in (own, corrected))
-    steps = mesh.vertices[ends[1]] - mesh.vertices[ends[0]]
-    return mesh.with_lengths(np.linalg.norm(steps, axis=2) * (after / before))
+    lengths = mesh.lengths
+    if lengths is None:
+        lengths = np.linalg.norm(mesh.vertices[ends[1]] - mesh.vertices[ends[0]], axis=2)
+    return mesh.with_lengths(lengths * (after / before))

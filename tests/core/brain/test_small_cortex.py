@@ -60,3 +60,31 @@ def test_smoothing_is_a_gaussian_of_the_distance(cortex, table):
     assert (smoothed[len(table) // 2 :] == 0.0).all()
     order = np.argsort(table[3][: len(table) // 2])
     assert smoothed[order[0]] == smoothed.max()
+
+
+def stretched(mesh: gc.TriangleMesh, factor: float, *, is_placed: bool = True) -> gc.TriangleMesh:
+    corners = mesh.vertices[mesh.faces]
+    lengths = factor * np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    vertices = mesh.vertices if is_placed else None
+    return gc.TriangleMesh.from_lengths(mesh.faces, lengths, vertices)
+
+
+@pytest.mark.parametrize("is_placed", [True, False])
+def test_both_hemispheres_keep_their_lengths_and_barriers(is_placed):
+    ball = gc.samples.sphere(20)
+    left = stretched(ball, 2.0, is_placed=is_placed).with_barriers([0, 1, 5])
+    right = stretched(ball, 3.0, is_placed=is_placed).with_barriers([7])
+    both = gc.brain.load_cortex({"left": left, "right": right})
+    assert both.mesh.barriers.tolist() == [0, 1, 5, 27]
+    for structure, mesh in zip(both.structures, (left, right), strict=True):
+        found = gc.exact_distance(both.mesh, structure.first + 3).distances[structure.part]
+        assert_array_equal(found, gc.exact_distance(mesh, 3).distances)
+    with pytest.raises(gc.errors.InvalidMesh, match="give all in the same way"):
+        gc.brain.load_cortex({"left": left, "right": ball})
+
+
+def test_corrected_areas_stretch_the_lengths_that_a_surface_was_given():
+    wide = stretched(gc.samples.sphere(20), 2.0, is_placed=False)
+    areas = gc.brain.load_cortex({"left": wide}).areas
+    cortex = gc.brain.load_cortex({"left": wide}, corrected_areas=4.0 * areas)
+    assert_allclose(cortex.mesh.lengths, 2.0 * wide.lengths, rtol=1e-15)
