@@ -63,6 +63,7 @@ CorrectedAreas = Annotated[
         help="Areas of vertices to measure by, for an average surface: files as for --roi."
     ),
 ]
+_MORPHOMETRY = (".curv", ".sulc", ".thickness", ".area", ".volume")
 _OF_MATRICES = (".dconn.nii", ".npz", ".zarr", ".parquet", ".npy")
 
 
@@ -185,8 +186,9 @@ def smooth(
     out: Annotated[
         Path,
         typer.Option(
-            help="Where they go: .dscalar.nii; for one hemisphere also .func.gii or .shape.gii.",
-            callback=writable(".nii", ".gii", to_stdout=False),
+            help="Where they go: .dscalar.nii; for one hemisphere also .func.gii or .shape.gii, "
+            "and for one map FreeSurfer's .curv, .sulc, .thickness, .area or .volume.",
+            callback=writable(".nii", ".gii", *_MORPHOMETRY, to_stdout=False),
         ),
     ],
     roi: Roi = None,

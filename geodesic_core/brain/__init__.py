@@ -10,6 +10,7 @@ from geodesic_core.brain.map_files import load_maps, write_labels, write_maps
 from geodesic_core.brain.parcellation import Parcellation, load_parcels
 from geodesic_core.brain.parcels import ParcelDistances, parcel_distances
 from geodesic_core.brain.smoothing import smooth
+from geodesic_core.brain.surface_files import write_surfaces
 
 __all__ = [
     "BrainMatrix",
@@ -25,4 +26,5 @@ __all__ = [
     "write_distances",
     "write_labels",
     "write_maps",
+    "write_surfaces",
 ]

@@ -17,6 +17,7 @@ from geodesic_core.brain.maps import MapSource, read_values
 from geodesic_core.brain.parcellation import Parcellation
 from geodesic_core.brain.structures import only
 from geodesic_core.errors import InvalidArgument
+from geodesic_core.io.label import write_label
 
 _METRICS = (".func.gii", ".shape.gii")
 _MORPHOMETRY = (".curv", ".sulc", ".thickness", ".area", ".volume")
@@ -113,14 +114,18 @@ def write_labels(path: str | Path, parcels: Parcellation) -> None:
     ----------
     path
         ``.dlabel.nii``; or of one hemisphere ``.label.gii``, or FreeSurfer's ``.annot``, which
-        counts the parcels from 1.
+        counts the parcels from 1, or ``.label``, which lists the vertices of a single one.
     parcels
-        From `load_parcels`. Those of both hemispheres that have one number are counted from 1.
+        From `load_parcels`. Those of both hemispheres that have one number are counted from 1. The
+        region is the parcel of ``load_parcels(np.ones(V), cortex)``.
 
     Raises
     ------
     InvalidArgument
-        The name ends otherwise, or the file would have to hold two hemispheres.
+        The name ends otherwise; the file would have to hold two hemispheres, or ``.label`` two
+        parcels.
+    NotEmbedded
+        ``.label`` holds positions, and the mesh is given by lengths alone.
     MissingExtra
         It needs nibabel, the extra ``brain``.
 
@@ -135,11 +140,11 @@ def write_labels(path: str | Path, parcels: Parcellation) -> None:
     (1, 2)
     """
     target = Path(path)
-    kind = kind_of(target, (".dlabel.nii", ".label.gii", ".annot"))
+    kind = kind_of(target, (".dlabel.nii", ".label.gii", *_WRITERS))
     cortex, count = parcels.cortex, len(parcels.names)
-    if kind == ".annot":
+    if kind in _WRITERS:
         only(cortex.structures, path, _REMEDY)
-        _write_annotation(target, parcels)
+        _WRITERS[kind](target, parcels)
         return
     keys = parcels.keys if len(set(parcels.keys)) == count else tuple(range(1, count + 1))
     rows = zip(keys, parcels.names, _colours(count), strict=True)
@@ -182,3 +187,17 @@ def _write_annotation(path: Path, parcels: Parcellation) -> None:
     table = np.pad(colours, ((1, 0), (0, 1)))  # black stands for none, and nothing is transparent
     write = nibabel("freesurfer", "write_labels").write_annot
     write(path, parcels.parcel_of + 1, table, ["unknown", *parcels.names], fill_ctab=True)
+
+
+def _write_label(path: Path, parcels: Parcellation) -> None:
+    """Write the vertices of one parcel, with their positions."""
+    count = len(parcels.names)
+    if count != 1:
+        raise InvalidArgument(f"{path} holds one parcel: write .annot or GIFTI for {count} parcels")
+    mesh = parcels.cortex.mesh
+    mesh.require_positions("a .label file")
+    write_label(path, np.flatnonzero(parcels.parcel_of == 0), mesh.vertices)
+
+
+_WRITERS = {".annot": _write_annotation, ".label": _write_label}
+"""What writes the parcels of one hemisphere for FreeSurfer"""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geodesic_core.arrays import Longs
+from geodesic_core.arrays import Floats, Longs
 from geodesic_core.control import Control
 from geodesic_core.errors import (
     EmptyBarrier,
@@ -195,6 +195,13 @@ def read_label(data: bytes, count: int) -> NDArray[np.bool_]:
     inside = np.zeros(count, bool)
     inside[vertices] = True
     return inside
+
+
+def write_label(path: Path, vertices: Longs, positions: Floats) -> None:
+    """Write a label of FreeSurfer: vertices, their positions as float32, and 0 as their values."""
+    rows = np.column_stack([vertices, positions[vertices], np.zeros(len(vertices))])
+    head = f"#!ascii label\n{len(rows)}"
+    np.savetxt(path, rows, "%d %.9g %.9g %.9g %g", header=head, comments="")
 
 
 def _annotation(data: bytes, count: int, label: _Label) -> NDArray[np.bool_]:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from nibabel.freesurfer import read_morph_data
 from nibabel.gifti import GiftiDataArray, GiftiImage
 from numpy.testing import assert_array_equal
 from scipy.sparse import load_npz
@@ -92,6 +93,9 @@ def test_values_are_smoothed_as_by_the_library(run: Run):
     expected = gc.brain.smooth(cortex, is_cortex(MESHES["left"]), 20.0)
     found = gc.brain.load_maps("smooth.func.gii", cortex)[0]
     assert_array_equal(found, expected.astype(np.float32))
+    told[-1] = "lh.smooth.thickness"
+    assert run("cortex", "smooth", f"left={SURFACES[0]}", *told).code == 0
+    assert_array_equal(read_morph_data("lh.smooth.thickness"), found)
 
 
 @pytest.mark.parametrize(

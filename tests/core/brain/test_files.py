@@ -184,6 +184,38 @@ def test_parcels_as_freesurfer_has_them(surfaces, masks, tmp_path):
         gc.brain.write_maps(tmp_path / "x.curv", cortex, [cortex.areas] * 2, ["a", "b"])
 
 
+def test_a_parcel_and_the_region_as_labels_of_freesurfer(surfaces, masks, tmp_path):
+    mesh, path = surfaces["left"], tmp_path / "lh.one.label"
+    cortex = gc.brain.load_cortex({"left": mesh}, masks["left"], "passes")
+    keys = keys_of(surfaces)[: len(cortex.areas)]
+    parcels = gc.brain.load_parcels(keys, cortex)
+    for values, vertices in (
+        (parcels.parcel_of == 2, np.flatnonzero(keys == 3)),
+        (np.ones(len(keys)), np.flatnonzero(masks["left"])),
+    ):
+        gc.brain.write_labels(path, gc.brain.load_parcels(values, cortex))
+        found, scalars = nibabel.freesurfer.read_label(path, read_scalars=True)
+        assert_array_equal(found, vertices)
+        assert not scalars.any()
+        places = np.loadtxt(path, np.float32, skiprows=2, usecols=(1, 2, 3))
+        assert_array_equal(places, mesh.vertices[vertices])  # float32 from the start
+        assert_array_equal(gc.load_label_vertices(path, mesh), vertices)
+        again = gc.brain.load_cortex({"left": mesh}, path, "passes")
+        assert_array_equal(again.region, vertices)
+
+    with pytest.raises(gc.errors.InvalidArgument, match=r"holds one parcel: write \.annot"):
+        gc.brain.write_labels(path, parcels)
+    both = gc.brain.load_parcels(np.ones(324), gc.brain.load_cortex(surfaces, masks, "passes"))
+    with pytest.raises(gc.errors.InvalidArgument, match=r"one\.label holds one hemisphere"):
+        gc.brain.write_labels(path, both)
+    with pytest.raises(gc.errors.NoSuchLabel, match="no vertex of the region has a label"):
+        gc.brain.load_parcels(np.zeros(162), cortex)
+    flat = gc.TriangleMesh.from_lengths(mesh.faces, np.ones(mesh.faces.shape))
+    unplaced = gc.brain.load_cortex({"left": flat})
+    with pytest.raises(gc.errors.NotEmbedded, match=r"a \.label file needs positions"):
+        gc.brain.write_labels(path, gc.brain.load_parcels(np.ones(162), unplaced))
+
+
 @needs_workbench
 @pytest.mark.jit
 def test_workbench_reads_what_is_written(surfaces, masks, tmp_path):
