@@ -1,14 +1,16 @@
 import { describe, expect, test } from "vitest";
 import { readState, type WrittenState, writeBarriers, writeState } from "../src/state/permalink";
-import { INITIAL, PALETTES, type State } from "../src/state/state";
+import { backTo, CURVES, INITIAL, PALETTES, type State, withCut } from "../src/state/state";
 import { placesAt, randomPoint } from "./support/points";
 import { Random } from "./support/random";
+
+const MESH_M: State = { ...INITIAL, mesh: "m" };
 
 function searchOf(state: State): string {
   return new URL(writeState(state), "http://host").search;
 }
 
-function randomState(random: Random): State {
+function randomState(random: Random, most = 2): State {
   const round = (x: number) => Number(x.toFixed(4));
   const view = random.pick([null, Array.from({ length: 6 }, () => round(6 * random.next() - 3))]);
   const name = () => random.pick(["", "Hut", "2 * 3", "a&b=c %2A é"]);
@@ -19,6 +21,7 @@ function randomState(random: Random): State {
   });
   return {
     mesh: random.pick([null, "0123456789abcdef", "f46a3f2a"]),
+    cut: random.pick([null, randomCut(random, most)]),
     places: places.length > 0 ? places : [],
     starts: places.length > 0 ? 1 + random.below(places.length) : 1,
     walk: random.pick([null, [random.size(), -random.size(), 0] as [number, number, number]]),
@@ -49,6 +52,13 @@ function randomState(random: Random): State {
     up: random.pick(view ? (["y", "z"] as const) : ([null, "y", "z"] as const)),
     view,
   };
+}
+
+/** Return a cut of a mesh that was cut a few times, at most. */
+function randomCut(random: Random, most: number): State["cut"] {
+  if (most === 0) return null;
+  const along = CURVES.slice(random.below(CURVES.length));
+  return { along, back: backTo({ ...randomState(random, most - 1), mesh: "f46a3f2a" }) };
 }
 
 describe("a round trip", () => {
@@ -104,6 +114,14 @@ describe("writing", () => {
     };
     expect(new URL(writeState(state), "http://127.0.0.1:8000").href.length).toBeLessThan(400);
     expect(readState(searchOf(state)).places).toEqual(state.places);
+  });
+
+  test("a cut is written with what was cut", () => {
+    const whole: State = { ...INITIAL, mesh: "m", places: placesAt({ vertex: 0 }, { vertex: 5 }) };
+    const cut = { ...INITIAL, ...withCut("n", ["path"], whole) };
+    expect(writeState(cut)).toBe(
+      "?mesh=n&cut=path&cut_from=mesh%3Dm%26source%3Dv0%26target%3Dv5&boundary=1",
+    );
   });
 
   test("a mesh with odd characters does not become other parameters", () => {
@@ -179,6 +197,11 @@ describe("reading", () => {
     ["barriers=3, 4,,5", { barriers: [[3, 4, 5]] }],
     ["barriers=8-10,2", { barriers: [[8, 9, 10, 2]] }],
     ["barriers=;8;;2,1;", { barriers: [[8], [2, 1]] }],
+    ["cut=path", {}],
+    ["cut=path&cut_from=", {}],
+    ["cut=bread&cut_from=mesh=m", {}],
+    ["cut=path&cut_from=mesh%3Dm%26source%3Dp1,2,3", {}],
+    ["cut=path&cut_from=mesh%3Dm", { cut: { along: ["path"], back: backTo(MESH_M) } }],
   ])("%s", (search, change) => {
     expect(readState(`?${search}`)).toEqual({ ...initial, ...change });
   });

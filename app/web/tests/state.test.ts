@@ -1,5 +1,5 @@
 import { describe, expect, test, vi } from "vitest";
-import { INITIAL, type State, Store, unitOf, withMesh } from "../src/state/state";
+import { cutsOf, INITIAL, type State, Store, unitOf, withCut, withMesh } from "../src/state/state";
 import { placesAt } from "./support/points";
 
 test("a store begins with the initial state", () => {
@@ -91,6 +91,40 @@ test("a distance between isolines belongs to a mesh, their number does not", () 
   expect(spaced).toMatchObject({ lines: INITIAL.lines, unit: "" });
   expect(withMesh("new", { ...INITIAL, lines: { count: 7 } }).lines).toEqual({ count: 7 });
   expect(withMesh("new", { ...INITIAL, lines: null }).lines).toBeNull();
+});
+
+test("a cut is taken back with what was set before, and what was chosen since stays", () => {
+  const store = new Store();
+  const view = [0, 1, 2, 0, 0, 0];
+  store.update({ mesh: "whole", places: placesAt({ vertex: 1 }, { vertex: 2 }), unit: "mm" });
+  store.update({ lines: { spacing: 0.5 }, view, up: "y" });
+  const whole = store.state;
+  store.update(withCut("halves", ["path"], whole));
+  expect(store.state).toEqual({
+    ...INITIAL,
+    ...{ mesh: "halves", cut: store.state.cut, boundary: true, unit: "mm", view, up: "y" },
+  });
+  const halves = store.state;
+  store.update({ places: placesAt({ vertex: 7 }), palette: "magma" });
+  store.update(withCut("quarters", ["walk", "isolines"], store.state));
+  store.update({ barriers: [[3]] });
+
+  const [first, second] = cutsOf(store.state);
+  expect([first?.along, second?.along]).toEqual([["path"], ["walk", "isolines"]]);
+  store.update(second?.back ?? {});
+  expect(store.state).toEqual({ ...halves, places: placesAt({ vertex: 7 }), palette: "magma" });
+  store.undo();
+  expect(store.state).toMatchObject({ mesh: "quarters", barriers: [[3]] });
+  store.update(first?.back ?? {});
+  expect(store.state).toEqual({ ...whole, palette: "magma" });
+  expect(withMesh("another", halves).cut).toBeNull();
+});
+
+test("the camera of an unrolled surface is not that of the surface", () => {
+  const view = [0, 1, 2, 0, 0, 0];
+  const cut = withCut("m", ["path"], { ...INITIAL, view, unroll: true });
+  expect(cut).toMatchObject({ view: null, unroll: false });
+  expect(cut.cut?.back).toMatchObject({ view: null, unroll: true });
 });
 
 test("a unit without a name is that of the mesh", () => {

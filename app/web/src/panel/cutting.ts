@@ -11,12 +11,9 @@ import { bordersOf } from "../ask/borders";
 import { isolinesOf, levelSetsOf } from "../ask/isolines";
 import { byId, count } from "../dom";
 import { service } from "../service";
-import { type State, type Store, withMesh } from "../state/state";
+import { CURVES, type Curves, type Cut, type State, type Store, withCut } from "../state/state";
 import type { Status } from "../status";
 import type { Notes } from "./notes";
-
-const KINDS = ["path", "walk", "isolines", "borders"] as const;
-type Kind = (typeof KINDS)[number];
 
 /** What is drawn now. */
 export interface Drawn {
@@ -31,6 +28,8 @@ export interface Drawn {
 
 export class Cutting {
   private readonly form = byId("cut");
+  /** What was told of cuts, by the meshes that they made. */
+  private readonly told = new Map<string, string>();
 
   constructor(
     private readonly store: Store,
@@ -50,20 +49,21 @@ export class Cutting {
     const { state } = this.store;
     const { path, walk, largest } = this.drawn();
     const hasLines = state.lines !== null && (largest > 0 || state.values !== null);
-    const offered: Record<Kind, boolean> = {
+    const offered: Record<Curves, boolean> = {
       path: path?.locations != null,
       walk: walk !== null,
       isolines: hasLines && state.shade !== "difference",
       borders: state.distances && state.starts > 1 && state.shade === "territories",
     };
-    for (const kind of KINDS) boxOf(kind).disabled = !offered[kind];
-    byId("cut-start", HTMLButtonElement).disabled = !KINDS.some((kind) => offered[kind]);
+    for (const kind of CURVES) boxOf(kind).disabled = !offered[kind];
+    byId("cut-start", HTMLButtonElement).disabled = !CURVES.some((kind) => offered[kind]);
+    byId("cut-note").textContent = this.told.get(state.mesh ?? "") ?? "";
   }
 
   private cut(): void {
     const { state } = this.store;
     const { mesh } = state;
-    const kinds = KINDS.filter((kind) => boxOf(kind).checked && !boxOf(kind).disabled);
+    const kinds = CURVES.filter((kind) => boxOf(kind).checked && !boxOf(kind).disabled);
     if (mesh === null || kinds.length === 0) {
       byId("cut-note").textContent = "Choose what to cut along.";
       return;
@@ -78,23 +78,27 @@ export class Cutting {
       const answer = await service.cut(mesh, curves.flat(), { name, ...call });
       const { cut_mesh_id, parts, vertices, warnings } = answer;
       stop.signal.throwIfAborted();
-      const { unit, up } = state;
-      const seen = { unit, up: this.drawn().up ?? up, view: this.drawn().view, boundary: true };
-      this.store.update({ ...withMesh(cut_mesh_id, state), ...seen });
+      const { up, view } = this.drawn();
       const words = `Cut along ${count(curves.flat().length, "curve")}: ${count(parts, "part")}`;
-      byId("cut-note").textContent = `${words}, ${count(vertices, "vertex", "vertices")}.`;
+      this.told.set(cut_mesh_id, `${words}, ${count(vertices, "vertex", "vertices")}.`);
+      this.store.update(withCut(cut_mesh_id, kinds, { ...state, up: up ?? state.up, view }));
       this.notes.tell("points", warnings);
       await this.list();
     });
   }
 }
 
-function boxOf(kind: Kind): HTMLInputElement {
+/** Return what a cut was along, in the words of its boxes: the path, isolines. */
+export function wordsOf({ along }: Cut): string {
+  return along.map((kind) => boxOf(kind).labels?.[0]?.textContent).join(", ");
+}
+
+function boxOf(kind: Curves): HTMLInputElement {
   return byId(`cut-${kind}`, HTMLInputElement);
 }
 
 async function curvesOf(
-  kind: Kind,
+  kind: Curves,
   mesh: string,
   state: State,
   { path, walk, largest }: Drawn,

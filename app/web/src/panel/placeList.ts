@@ -1,9 +1,10 @@
-// The list of what is set: points, each with its name, and after them the walk and the barriers.
+// The list of what is set: points, each with its name, then the walk, the barriers and the cuts.
 import { byId, count } from "../dom";
 import { LONGEST_NAME } from "../state/permalink";
 import { nameOf, reordered, without } from "../state/places";
 import { sayPoint } from "../state/point";
-import type { State, Store } from "../state/state";
+import { cutsOf, type State, type Store } from "../state/state";
+import { wordsOf } from "./cutting";
 
 export class PlaceList {
   private readonly list = byId("places");
@@ -12,7 +13,7 @@ export class PlaceList {
 
   /** Show what is set; a list that is as before stays as it is. */
   show(state: State, before: State | null): void {
-    const isOther = (["places", "starts", "walk", "barriers"] as const).some(
+    const isOther = (["places", "starts", "walk", "barriers", "cut"] as const).some(
       (each) => state[each] !== before?.[each],
     );
     if (!isOther) return;
@@ -24,9 +25,13 @@ export class PlaceList {
       const words = `${name} of ${count(faces.length, "face")}`;
       rows.push(this.extra("barrier", words, { barriers: barriers.toSpliced(i, 1) }));
     });
+    byId("clear", HTMLButtonElement).disabled = rows.length === 0 && state.maxDistance === null;
+    cutsOf(state).forEach((cut, i, { length }) => {
+      const name = length > 1 ? `Cut ${i + 1}` : "Cut";
+      rows.push(this.extra("cut", `${name} along ${wordsOf(cut)}`, cut.back));
+    });
     this.list.replaceChildren(...rows);
     byId("nothing").hidden = rows.length > 0;
-    byId("clear", HTMLButtonElement).disabled = rows.length === 0 && state.maxDistance === null;
   }
 
   private rowOf(state: State, index: number): HTMLLIElement {

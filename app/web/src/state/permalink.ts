@@ -6,6 +6,9 @@ import type { Barriers } from "./barriers";
 import type { Place } from "./places";
 import { parsePoint, type WrittenPoint, writePoint } from "./point";
 import {
+  backTo,
+  CURVES,
+  type Cut,
   INITIAL,
   type Lines,
   PALETTES,
@@ -31,6 +34,10 @@ export type WrittenState = Omit<State, "places"> & { places: readonly Place<Writ
 export function writeState(state: State): string {
   const query = new URLSearchParams();
   if (state.mesh) query.set("mesh", state.mesh);
+  if (state.cut) {
+    query.set("cut", state.cut.along.join(","));
+    query.set("cut_from", writeState({ ...INITIAL, ...state.cut.back }).slice(1));
+  }
   const { places, starts } = state;
   const hasEnd = places.length > starts;
   const parts = {
@@ -94,6 +101,7 @@ export function readState(search: string): WrittenState {
   const view = numbers?.length === 6 && numbers.every(Number.isFinite) ? numbers : null;
   return {
     mesh: query.get("mesh"),
+    cut: readCut(query.get("cut"), query.get("cut_from")),
     places: [...sources, ...others].map(readPlace),
     starts: Math.max(1, sources.length),
     walk: readWalk(query.get("walk") ?? ""),
@@ -125,6 +133,19 @@ export function readState(search: string): WrittenState {
     up: UPS.find((up) => up === query.get("up")) ?? (view && "y"),
     view,
   };
+}
+
+/** Read a cut: along what, and the address of what was cut, which the page wrote. */
+function readCut(along: string | null, from: string | null): Cut | null {
+  if (along === null || from === null) return null;
+  const { places, ...before } = readState(from);
+  const kinds = CURVES.filter((kind) => along.split(",").includes(kind));
+  if (before.mesh === null || kinds.length === 0 || !places.every(isLocated)) return null;
+  return { along: kinds, back: backTo({ ...before, places }) };
+}
+
+function isLocated(place: Place<WrittenPoint>): place is Place {
+  return !("position" in place.point);
 }
 
 /** Write a point, and behind it its name, which may hold any character but a semicolon. */

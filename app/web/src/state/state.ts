@@ -28,8 +28,19 @@ export interface Section {
   share: number;
 }
 
+/** The curves that a mesh is cut along. */
+export const CURVES = ["path", "walk", "isolines", "borders"] as const;
+export type Curves = (typeof CURVES)[number];
+/** A cut that made the mesh: along which curves, and the change that takes it back. */
+export interface Cut {
+  along: readonly Curves[];
+  back: Partial<State>;
+}
+
 export interface State {
   mesh: string | null;
+  /** The cut that made the mesh; the change back has the cut before it. */
+  cut: Cut | null;
   /** The starts, then the stops of the path, then its end. */
   places: readonly Place[];
   /** How many of the places are starts; with one place more there is a path. */
@@ -80,6 +91,7 @@ export interface State {
 
 export const INITIAL: State = {
   mesh: null,
+  cut: null,
   places: [],
   starts: 1,
   walk: null,
@@ -205,23 +217,48 @@ export class Store {
   }
 }
 
+/** What is gone with the mesh that it belongs to. */
+const OF_MESH = {
+  ...NO_QUESTION,
+  cut: null,
+  unit: "",
+  slope: null,
+  faceCosts: null,
+  values: null,
+  least: null,
+  range: null,
+  section: null,
+  unroll: false,
+} satisfies Partial<State>;
+
 /** Return the change to another mesh: what belongs to the one before is gone. */
 export function withMesh(mesh: string, { lines }: State): Partial<State> {
   return {
+    ...OF_MESH,
     mesh,
-    ...NO_QUESTION,
-    unit: "",
-    slope: null,
-    faceCosts: null,
-    values: null,
-    least: null,
-    range: null,
-    section: null,
-    unroll: false,
     lines: lines && "spacing" in lines ? INITIAL.lines : lines,
     up: null,
     view: null,
   };
+}
+
+/** Return the change to what was cut from the mesh, with its boundary; the camera stays. */
+export function withCut(mesh: string, along: readonly Curves[], state: State): Partial<State> {
+  const { unit, up, view, unroll } = state;
+  const cut = { along, back: backTo(state) };
+  return { ...withMesh(mesh, state), cut, unit, boundary: true, up, view: unroll ? null : view };
+}
+
+/** Return the change back to the mesh of a state with all that is set on it; the camera stays. */
+export function backTo(state: State): Partial<State> {
+  const names = ["mesh", "lines", "boundary", ...Object.keys(OF_MESH)] as (keyof State)[];
+  const change = Object.fromEntries(names.map((name) => [name, state[name]]));
+  return state.unroll ? { ...change, view: null } : change;
+}
+
+/** Return the cuts that made the mesh, in their order. */
+export function cutsOf({ cut }: Partial<State>): Cut[] {
+  return cut ? [...cutsOf(cut.back), cut] : [];
 }
 
 /** Return the unit in words. */
