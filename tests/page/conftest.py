@@ -88,6 +88,19 @@ def wedge() -> str:
     return "\n".join(lines)
 
 
+@pytest.fixture
+def phone(view: View) -> View:
+    """The page on a small phone, which is dark and touched by fingers."""
+    view.become_phone()
+    return view
+
+
+@pytest.fixture(params=["desktop", "phone"])
+def device(view: View, request: pytest.FixtureRequest) -> View:
+    """The page on a desktop, light and with a mouse; then on a phone."""
+    return request.getfixturevalue("phone") if request.param == "phone" else view
+
+
 @pytest.fixture(scope="module")
 def context(browser: Browser, service: str) -> Iterator[BrowserContext]:
     """A browser profile that the pages of a module share: each opens in half the time."""

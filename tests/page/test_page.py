@@ -5,7 +5,7 @@ import math
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
@@ -68,30 +68,6 @@ def test_the_page_opens_on_a_coloured_sample_whose_path_follows_the_pointer(view
     view.page.mouse.move(x, y)
     view.wait()
     assert "target" not in query_of(view)
-
-
-def test_each_story_opens_with_its_answer(view: View) -> None:
-    view.open()
-    assert view.text("h1") == "Geodesic"
-    assert view.text("#about").startswith("Shortest paths and distances along the surface")
-    stories = view.page.locator("#stories a")
-    for i in range(stories.count()):
-        story = stories.nth(i)
-        title = story.locator("strong").inner_text()
-        story.click()
-        view.wait()
-        query = query_of(view)
-        assert (len(query["mesh"]), "sample" in query) == (1, False), title
-        assert view.page.is_visible("#legend"), title
-        if "target" in query:
-            assert length_of(view) > 0, title
-            assert len(seen(view, PATH)) > 50, title
-        else:
-            starts = len(query["source"])
-            assert view.page.locator("#territories li").count() == starts > 1, title
-        assert not view.page.is_visible("#stories ul"), "what is not used is folded"
-        view.unfold("stories")
-    assert i == 4
 
 
 def test_the_axis_upwards_is_guessed_and_can_be_chosen(view: View, service: str) -> None:
@@ -356,42 +332,6 @@ def test_the_list_is_renamed_reordered_and_shortened(view: View, sphere: str) ->
     view.wait()
     assert rows(view) == ["⠿ A Hut ×", "⠿ 1 Pass, high ×", "⠿ B vertex 7 ×"]
     assert not {"barriers", "walk"} & set(query_of(view))
-
-
-def test_everything_can_be_undone_and_done_again(view: View, sphere: str) -> None:
-    view.open(f"/?mesh={sphere}&{PLAIN}")
-    told: list[dict[str, list[str]]] = [query_of(view)]
-
-    def step(act: Callable[[], object]) -> None:
-        act()
-        view.wait()
-        told.append(query_of(view))
-        assert told[-1] != told[-2]
-
-    view.unfold("more-colours")
-    step(lambda: view.click(-100, 0))
-    step(lambda: view.click(100, 0))
-    step(lambda: view.drag((100, 0), (60, 60), (0, 60)))
-    step(lambda: view.click(0, -60, "Alt"))
-    step(lambda: view.click(-60, -60, "Shift"))
-    view.page.click("#tools >> text=Barrier")
-    step(lambda: view.drag((20, 20), (40, 40)))
-    step(lambda: view.page.select_option("#palette", "magma"))
-    step(lambda: view.page.uncheck("#distances"))
-    step(lambda: view.page.click("#places >> [aria-label='Remove A']"))
-    step(lambda: view.page.click("#clear"))
-    for before in reversed(told[:-1]):
-        view.page.keyboard.press("Control+z")
-        assert query_of(view) == before
-    assert view.page.is_disabled("#undo")
-    for after in told[1:]:
-        view.page.click("#redo")
-        assert query_of(view) == after
-    view.page.click("#undo")
-    view.page.keyboard.press("Control+Shift+z")
-    view.wait()
-    assert query_of(view) == told[-1]
-    assert not view.page.is_visible("#legend")
 
 
 def test_colours_are_those_of_the_distance(view: View, sphere: str) -> None:

@@ -8,12 +8,6 @@ from tests.support.viewing import View
 pytestmark = pytest.mark.file_slice(1)
 
 
-@pytest.fixture
-def phone(view: View) -> View:
-    view.page.set_viewport_size({"width": 360, "height": 640})
-    return view
-
-
 def box_of(view: View, selector: str) -> FloatRect:
     box = view.page.locator(selector).bounding_box()
     assert box is not None, f"{selector} is not to be seen"

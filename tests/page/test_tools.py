@@ -15,7 +15,7 @@ from playwright.sync_api import FilePayload
 
 from tests.page.conftest import sample
 from tests.page.test_exports import saved
-from tests.page.test_page import seen
+from tests.page.test_page import rows, seen
 from tests.support.viewing import PLAIN, View, length_of, query_of
 
 pytestmark = pytest.mark.file_slice(4)
@@ -113,6 +113,49 @@ def test_the_mesh_is_cut_along_isolines_and_this_is_undone(
     view.wait()
     assert query_of(view)["mesh"] == [sphere]
     assert view.text("#length") == before
+
+
+def test_a_row_of_the_list_leads_back_to_before_its_cut(view: View, service: str) -> None:
+    """By the keyboard, from a cut of a cut, after the page is opened anew."""
+    whole = sample(service, "sphere", 800)
+    view.open(f"/?mesh={whole}&source=v0&target=v90&lines=none")
+    meshes = [whole]
+    for points in ("v0 > v90", "v5 > v70"):
+        view.ask(points)
+        view.press("#cut-start")
+        meshes += query_of(view)["mesh"]
+    assert rows(view) == ["Cut 1 along the path ×", "Cut 2 along the path ×"]
+    assert len(set(meshes)) == 3
+    assert view.page.is_disabled("#clear"), "that is for the question"
+
+    view.page.reload()
+    view.wait()
+    for name, mesh, points in (
+        ("Cut 2 along the path", meshes[1], "v5 > v70"),
+        ("Cut along the path", whole, "v0 > v90"),
+    ):
+        view.page.focus(f"#places >> [aria-label='Remove {name}']")
+        view.page.keyboard.press("Enter")
+        view.wait()
+        assert query_of(view)["mesh"] == [mesh]
+        assert view.page.input_value("#points") == points
+        assert length_of(view) > 0
+    assert view.page.locator("#places .cut").count() == 0
+
+
+def test_what_was_cut_may_be_gone(view: View, service: str) -> None:
+    whole = sample(service, "sphere", 500)
+    view.open(f"/?mesh={whole}&source=v0&target=v90&lines=none")
+    view.press("#cut-start")
+    (cut_mesh,) = query_of(view)["mesh"]
+    assert httpx2.delete(f"{service}/v1/meshes/{whole}").status_code == 204
+    view.page.click("#places >> [aria-label='Remove Cut along the path']")
+    view.wait("error")
+    assert view.text("#error-title") == "Mesh not found"
+    view.page.click("#undo")
+    view.wait()
+    assert query_of(view)["mesh"] == [cut_mesh]
+    assert rows(view) == ["Cut along the path ×"]
 
 
 def test_values_of_a_file_are_coloured_with_their_level_sets(

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from playwright.sync_api import ConsoleMessage, FilePayload, Page
+from playwright.sync_api import ConsoleMessage, FilePayload, Locator, Page
 
 Pixel = tuple[float, float]
 
 PLAIN = "lines=none&view=0.6,1.2,2.9,0,0,0"
+TAP_S, HOLD_S = 0.1, 0.7
 
 
 class View:
@@ -21,6 +22,7 @@ class View:
     def __init__(self, page: Page) -> None:
         self.page = page
         self.errors: list[str] = []
+        self.is_phone = False
         self._devtools = page.context.new_cdp_session(page)  # for what Playwright has no words
         self._fingers = 0
         self._time = time()
@@ -45,15 +47,45 @@ class View:
             if there.count():
                 return
 
+    def become_phone(self) -> None:
+        """Be small and dark, and touched by fingers: from now on a click is a tap."""
+        self.is_phone = True
+        self.page.set_viewport_size({"width": 360, "height": 640})
+        self.page.emulate_media(color_scheme="dark")
+
     def unfold(self, name: str) -> None:
         """Open a folded part of the panel."""
         self.page.click(f"#{name} > summary")
 
+    def fold(self) -> None:
+        """Have the mesh whole: close the panel where it takes half of a phone."""
+        if self.is_phone and self.page.is_visible("#folded"):
+            self.page.tap("#fold")
+
+    def reach(self, selector: str) -> Locator:
+        """Return a control, once it is there to be seen: what is folded around it is opened."""
+        control = self.page.locator(selector)
+        if control.locator("xpath=ancestor::*[@id='folded'][@hidden]").count():
+            self.page.tap("#fold")
+        closed = control.locator("xpath=ancestor::details[not(@open)][1]/summary")
+        while closed.count():
+            self._press(closed)
+        return control
+
+    def press(self, selector: str) -> None:
+        """Press a control: with the mouse, or a finger."""
+        self._press(self.reach(selector))
+        self.wait()
+
+    def _press(self, control: Locator) -> None:
+        if self.is_phone:
+            control.tap()
+        else:
+            control.click()
+
     def ask(self, text: str, field: str = "#points") -> None:
         """Write something into a field of the question."""
-        if not self.page.is_visible(field):
-            self.unfold("more-points")
-        self.page.fill(field, text)
+        self.reach(field).fill(text)
         self.page.press(field, "Enter")
 
     def hover(self, x: float, y: float) -> str:
@@ -76,7 +108,16 @@ class View:
         return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
     def click(self, x: float = 0, y: float = 0, *modifiers: Any) -> None:
-        """Click beside the middle of the mesh, so many pixels to the right and down."""
+        """
+        Click beside the middle of the mesh, so many pixels to the right and down.
+
+        On a phone this is a tap, or with Alt, which it does not have, a finger that stays.
+        """
+        if self.is_phone:
+            self.touch((x, y))
+            self.touch(after=HOLD_S if "Alt" in modifiers else TAP_S)
+            self.wait()
+            return
         centre = self.centre
         for key in modifiers:
             self.page.keyboard.down(key)
@@ -87,6 +128,12 @@ class View:
 
     def drag(self, *places: Pixel, steps: int = 4) -> None:
         """Press at the first of some places beside the middle, move to the others, let go."""
+        if self.is_phone:
+            for place in places:
+                self.touch(place)
+            self.touch()
+            self.wait()
+            return
         x, y = self.centre
         mouse = self.page.mouse
         mouse.move(x + places[0][0], y + places[0][1])
@@ -155,7 +202,8 @@ def angle_at(view: View, away: float) -> float:
     """Return the angle from the middle of a unit sphere to what is drawn so many pixels away."""
     box = view.page.locator("#canvas").bounding_box()
     assert box is not None
-    slope = away / (box["height"] / 2) * math.tan(math.radians(38 / 2))
+    half = min(box["width"], box["height"]) / 2
+    slope = away / half * math.tan(math.radians(38 / 2))
     distance, radius = 2.9, 1 / math.sqrt(3)  # of a sphere whose bounding box's diagonal is 2
     ray = math.atan(slope)
     return math.asin(distance * math.sin(ray) / radius) - ray

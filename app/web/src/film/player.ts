@@ -163,7 +163,7 @@ export class Player {
     const { settled, distances } = film.sweep;
     const isReached = (v: number): boolean => (settled[v] ?? Infinity) <= step;
     surface.setReached(
-      distances.map((distance, v) => (isReached(v) ? (distance ?? -1) : -1)),
+      distances.map((distance, v) => (isReached(v) ? (distance ?? Infinity) : Infinity)),
       film.largest,
     );
     this.windows.show(step);

@@ -263,7 +263,8 @@ export class Stage {
     this.camera.fov = (Math.atan(slope) * 360) / Math.PI;
     this.camera.updateProjectionMatrix();
     if (this.whole) this.lookAtAll(this.whole);
-    this.invalidate();
+    this.backdrop.forget();
+    this.render(); // at once: the canvas is empty
   }
 
   /** Draw only what is on the positive side of a plane, where there is one. */
