@@ -4,7 +4,7 @@ import os
 import signal
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from tests.support.deployment import Deployment, Part, Replica
@@ -15,6 +15,7 @@ AWAY_S = 10.0
 LONG_AWAY_S = 300.0
 LONG_NS = 2e8
 """Processor time by which a worker with a long question is known"""
+CONTROLLER = "ServeController"
 RESTART_S = 2.0
 """Seconds until whatever supervises a command runs it again"""
 
@@ -31,6 +32,8 @@ class Failure:
     """Statuses and codes that clients may see because of it"""
     breaks: Callable[[Deployment], Replica | None] = field(default=lambda _: None)
     """The replica whose connections end"""
+    pause_s: float = 0.0
+    """Mean rest of each user between two questions; 0 for hardly any"""
 
 
 def busiest(deployment: Deployment) -> tuple[Part, int]:
@@ -75,6 +78,18 @@ def cut_host_off(_deployment: Deployment, node: Part) -> None:
         time.sleep(2 * AWAY_S)
 
 
+def kill_controller(deployment: Deployment, _: None) -> None:
+    """Kill what keeps the hosts, on the head; Ray starts another one."""
+    deployment.head.named(CONTROLLER)[0].kill()
+    wait_until(lambda: deployment.head.named(CONTROLLER))
+
+
+def kill_controller_and_host(deployment: Deployment, node: Part) -> None:
+    """Kill it, and at once the machine of a host, which only the next controller can miss."""
+    deployment.head.named(CONTROLLER)[0].kill()
+    kill_host(deployment, node)
+
+
 def _kill_head(seconds: float) -> Callable[[Deployment, None], None]:
     def kill_head(deployment: Deployment, _: None) -> None:
         deployment.head.kill()
@@ -117,6 +132,8 @@ FAILURES = (
     Failure("a worker is killed", kill_worker, busiest, ((500, "worker_died"),)),
     Failure("a host is killed, and comes back", kill_host, busiest_node),
     Failure("a host is cut off for 20 s", cut_host_off, busiest_node),
+    Failure("Ray Serve's controller is killed", kill_controller),
+    Failure("that controller is killed, and a host", kill_controller_and_host, busiest_node),
     Failure("the head is killed, and comes back after 10 s", _kill_head(AWAY_S)),
     Failure(
         "the store does not answer for 10 s",
@@ -136,3 +153,8 @@ FAILURES = (
     Failure("a node is stopped by SIGTERM", stop_node, busiest_node),
     Failure("the head is killed, and comes back after 5 minutes", _kill_head(LONG_AWAY_S)),
 )
+OF_RAY = ("a host is killed, and comes back", "that controller is killed, and a host")
+WITH_TLS = tuple(
+    replace(each, name=f"with TLS: {each.name}") for each in FAILURES if each.name in OF_RAY
+)
+"""Those in which machines meet again, once more where they speak TLS"""

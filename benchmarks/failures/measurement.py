@@ -1,8 +1,8 @@
-"""The campaign as a benchmark: each failure in turn, on one deployment, and a report."""
+"""The campaign as a benchmark: each failure in turn, some again with TLS, and a report."""
 
 from pathlib import Path
 
-from benchmarks.failures.failures import FAILURES
+from benchmarks.failures.failures import FAILURES, WITH_TLS
 from benchmarks.failures.plan import make_load
 from benchmarks.failures.report import write_report
 from benchmarks.failures.trial import SETTINGS, try_out
@@ -15,8 +15,9 @@ def run(path: Path) -> str:
     if obstacle():
         raise RuntimeError(obstacle())
     load, trials, text = make_load(), [], ""
-    with deployed(**SETTINGS) as deployment:
-        for failure in FAILURES:
-            trials.append(try_out(deployment, load, failure))
-            text = write_report(trials, path)  # each time, for those who cannot wait
+    for failures, tls in ((FAILURES, False), (WITH_TLS, True)):
+        with deployed(tls=tls, **SETTINGS) as deployment:
+            for failure in failures:
+                trials.append(try_out(deployment, load, failure))
+                text = write_report(trials, path)  # each time, for those who cannot wait
     return text

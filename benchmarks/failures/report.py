@@ -12,15 +12,16 @@ LIMIT_S = 10.0
 
 
 ABOUT = (
-    "A head, two nodes with one worker each and one for small work, two replicas, an S3 server "
+    "A head, two nodes with one worker each and one for small work, three replicas, an S3 server "
     "(moto) and PostgreSQL, each in a network namespace of its own, on the same cores. Seven users "
     "ask small questions, send jobs and upload meshes; two others ask long questions. Each answer "
     "is compared with that of the library, bit by bit. One thing after the other fails under this "
-    "load; a supervisor starts commands again; nothing else is done by hand."
+    "load; a supervisor starts commands again; nothing else is done by hand. The last ones happen "
+    "where all machines speak TLS."
 )
 TIMES = (
     "Times count from the failure; that of a refusal from its request, if that came later. All is "
-    "as before when both replicas are ready and know all workers; the time includes that for which "
+    "as before when all replicas are ready and know all workers; the time includes that for which "
     "the failure lasts. The last column names other commands that ended by themselves."
 )
 COLUMNS = (

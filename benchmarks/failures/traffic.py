@@ -34,6 +34,8 @@ from benchmarks.soak.traffic import (
 NO_CONNECTION = (0, "")
 LOOK_S = 0.2
 RECONNECT_S = 1.0
+LONG = 20
+"""How much longer who asks long questions rests, where users do rest"""
 ENDED = ("successful", "failed", "dismissed")
 
 
@@ -147,6 +149,7 @@ def main() -> None:
     parser.add_argument("promises", type=Path, help="where each promise becomes a line of JSON")
     parser.add_argument("urls", nargs="+", help="of the replicas")
     parser.add_argument("--refusal", action="append", default=[], metavar="STATUS,CODE")
+    parser.add_argument("--pause", type=float, help="mean seconds between questions of a user")
     parser.add_argument("--breaks", action="store_true", help="connections may end")
     arguments = parser.parse_args()
     load = pickle.loads(arguments.load.read_bytes())  # noqa: S301 - written by our parent
@@ -155,6 +158,9 @@ def main() -> None:
     User.refusals = LIMITS | refusals | ({NO_CONNECTION} if arguments.breaks else set())
     Client.hosts, User.host = arguments.urls, arguments.urls[0]
     kinds: list[type[locust.User]] = [Asker, LongAsker, Worker, Uploader]
+    if arguments.pause:
+        Client.wait_time = locust.between(0.0, 2 * arguments.pause)
+        LongAsker.wait_time = locust.between(0.0, 2 * LONG * arguments.pause)
     environment = Environment(user_classes=kinds, stop_timeout=LONG_S)
     runner = environment.create_local_runner()
     gevent.signal_handler(signal.SIGTERM, lambda: gevent.spawn(runner.quit))

@@ -124,12 +124,14 @@ def try_out(deployment: Deployment, load: Load, failure: Failure) -> Trial:
 
 @contextmanager
 def _traffic(deployment: Deployment, load: Load, failure: Failure, folder: Path) -> Iterator[Path]:
-    """Send traffic to both replicas inside the block; requests under way at its end get answers."""
+    """Send traffic to all replicas inside the block; requests under way at its end get answers."""
     (folder / "load").write_bytes(pickle.dumps(load))
     record = folder / "record"
     options = [f"--refusal={status},{code}" for status, code in failure.refusals]
     if failure.breaks(deployment):
         options.append("--breaks")
+    if failure.pause_s:
+        options.append(f"--pause={failure.pause_s}")
     urls = [replica.url for replica in deployment.replicas]
     command = [sys.executable, "-m", "benchmarks.failures.traffic"]
     files = [str(folder / "load"), str(record), str(folder / "promises")]
@@ -165,12 +167,13 @@ def _wait_for_answers(record: Path, count: int) -> None:
 
 
 def _restore(deployment: Deployment) -> Sequence[str]:
-    """Wait until replicas are ready and know all workers; return the names of parts that ended."""
+    """Wait until all workers are there, and known; return the names of parts that ended."""
     restarts: list[str] = []
 
     def is_whole() -> bool:
         restarts.extend(deployment.supervise())
-        return all(_is_whole(replica) for replica in deployment.replicas)
+        workers = sum(len(node.workers()) for node in deployment.nodes)
+        return workers == WORKERS and all(_is_whole(each) for each in deployment.replicas)
 
     wait_until(is_whole)
     return restarts
@@ -216,7 +219,7 @@ def _broken(
     kept = {promise.get("kept") for promise in promises}
     open_ones = [each for each in promises if "kept" not in each and each.get("job") not in kept]
     for number, promise in enumerate(open_ones):
-        replica = deployment.replicas[number % 2]
+        replica = deployment.replicas[number % len(deployment.replicas)]
         key = {"Authorization": f"Bearer {SECRETS[promise['caller']]}"}
         if "mesh" in promise:
             answer = replica.ask(f"/v1/meshes/{promise['mesh']}", **key)

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from benchmarks.failures.failures import FAILURES, Failure
+from benchmarks.failures.failures import FAILURES, WITH_TLS, Failure
 from benchmarks.failures.plan import Load, make_load
 from benchmarks.failures.trial import SETTINGS, try_out
 from tests.support.deployment import Deployment, deployed
@@ -23,12 +23,17 @@ def load() -> Load:
 
 
 @pytest.fixture(scope="module")
-def deployment() -> Iterator[Deployment]:
-    with deployed(**SETTINGS) as deployment:
+def deployment(request: pytest.FixtureRequest) -> Iterator[Deployment]:
+    with deployed(tls=request.param, **SETTINGS) as deployment:
         yield deployment
 
 
-@pytest.mark.parametrize("failure", FAILURES, ids=lambda each: each.name)
+@pytest.mark.parametrize(
+    ("deployment", "failure"),
+    [(tls, each) for tls, some in ((False, FAILURES), (True, WITH_TLS)) for each in some],
+    indirect=["deployment"],
+    ids=lambda value: value.name if isinstance(value, Failure) else "",
+)
 def test_nobody_gets_a_wrong_answer_and_nothing_is_lost(
     deployment: Deployment, load: Load, failure: Failure
 ) -> None:

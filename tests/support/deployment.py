@@ -10,13 +10,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import httpx2
+import psutil
 
 from tests.support.cluster import OPTIONS, RAY_START, TOKEN, variables_of_ray
 from tests.support.machines import Machine, Network, network
 from tests.support.postgres import Server as Postgres
 from tests.support.postgres import running_postgres
-from tests.support.processes import COMMAND_LINE, workers_of
+from tests.support.processes import COMMAND_LINE
 from tests.support.s3 import S3
+from tests.support.tls import Authority
 from tests.support.waiting import LONG_S, wait_until
 
 HEAD_PORT, PORT = 6379, 8000
@@ -52,9 +54,13 @@ class Part:
         self.process.terminate()
         return self.process.wait()
 
+    def named(self, name: str) -> list[psutil.Process]:
+        """Return the processes on the machine with a name, such as that of an actor."""
+        return [each for each in self.machine.processes() if name in each.name()]
+
     def workers(self) -> set[int]:
         """Return the ids of the worker processes on the machine."""
-        return set[int]().union(*(workers_of(each.pid) for each in self.machine.processes()))
+        return {each.pid for each in self.named("geodesic-worker")}
 
 
 class Replica(Part):
@@ -90,10 +96,13 @@ class Replica(Part):
 class Deployment:
     """The parts, and what they share."""
 
-    def __init__(self, stack: ExitStack, lan: Network, folder: Path, **settings: str) -> None:
+    def __init__(
+        self, stack: ExitStack, lan: Network, folder: Path, *, tls: bool, **settings: str
+    ) -> None:
         self.folder = folder
-        head, *nodes = (lan.add() for _ in range(3))
-        replicas, shared, database = [lan.add(), lan.add()], lan.add(), lan.add()
+        self._authority = Authority(folder) if tls else None
+        shared, database, head = (lan.add() for _ in range(3))
+        nodes, fronts = [lan.add() for _ in range(2)], [lan.add() for _ in range(3)]
         self.postgres: Postgres = stack.enter_context(
             running_postgres(database.address, database.inside, lan.addresses)
         )
@@ -113,13 +122,10 @@ class Deployment:
         head_options = ["--head", f"--port={HEAD_PORT}", "--include-dashboard=false"]
         self.head = Part(*self._ray(head, "h", head_options, records))
         self.nodes = [
-            Part(*self._ray(node, name, [*self._joining, "--resources", '{"geodesic": 1}'], {}))
-            for name, node in zip(("n1", "n2"), nodes, strict=True)
+            Part(*self._ray(each, f"n{n}", [*self._joining, "--resources", '{"geodesic": 1}'], {}))
+            for n, each in enumerate(nodes, start=1)
         ]
-        self.replicas = [
-            self._replica(name, replica)
-            for name, replica in zip(("r1", "r2"), replicas, strict=True)
-        ]
+        self.replicas = [self._replica(f"r{n}", each) for n, each in enumerate(fronts, start=1)]
 
     @property
     def _joining(self) -> Sequence[str]:
@@ -129,7 +135,8 @@ class Deployment:
         self, machine: Machine, name: str, options: Sequence[str], settings: Mapping[str, str]
     ) -> tuple[Machine, Sequence[str], Mapping[str, str], Path]:
         folder = self.folder / name
-        own = {"GEODESIC_COPIES": str(folder / "copies"), **settings}
+        tls = {} if self._authority is None else self._authority.certify(machine.address)
+        own = {"GEODESIC_COPIES": str(folder / "copies"), **tls, **settings}
         at = [f"--node-ip-address={machine.address}", f"--temp-dir={folder}"]
         command = [*RAY_START, *OPTIONS, *options, *at]
         return machine, command, self.settings | own, self.folder / f"{name}.log"
@@ -180,12 +187,12 @@ class Deployment:
 
 
 @contextmanager
-def deployed(**settings: str) -> Iterator[Deployment]:
+def deployed(*, tls: bool = False, **settings: str) -> Iterator[Deployment]:
     """Have a deployment inside the block, which has been started."""
     with ExitStack() as stack:
         lan = stack.enter_context(network())
         prefix = tempfile.TemporaryDirectory(prefix="g", ignore_cleanup_errors=True)
-        deployment = Deployment(stack, lan, Path(stack.enter_context(prefix)), **settings)
+        deployment = Deployment(stack, lan, Path(stack.enter_context(prefix)), tls=tls, **settings)
         stack.callback(deployment.close)
         deployment.start()
         yield deployment
