@@ -31,6 +31,7 @@ from benchmarks import (
     topology,
     virtual_sources,
 )
+from benchmarks.failures import hours
 from benchmarks.failures import measurement as failures
 from benchmarks.inputs import Inputs
 from benchmarks.paper import experiments as paper
@@ -69,10 +70,10 @@ BENCHMARKS: dict[str, Callable[[Inputs, int], Section | Iterable[Section]]] = {
     "page": page.run,
     "first-colours": first_colours.run,
 }
-SOAK, SCALING, FAILURES = "soak", "scaling", "failures"
+SOAK, SCALING, FAILURES, HOURS = "soak", "scaling", "failures", "hours"
 PAPER, PEERS, GATE = "paper", "peers", "gate"
 """Run only where they are named, and write reports of their own"""
-NAMES = (*BENCHMARKS, SOAK, SCALING, FAILURES, PAPER, PEERS, GATE)
+NAMES = (*BENCHMARKS, SOAK, SCALING, FAILURES, HOURS, PAPER, PEERS, GATE)
 ROOT = Path(__file__).parents[1]
 
 
@@ -81,7 +82,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="name", help=f"any of {', '.join(NAMES)}")
     parser.add_argument("--runs", type=int, default=5, help="runs of which the median counts")
-    parser.add_argument("--minutes", type=float, default=10.0, help="minutes of the soak")
+    parser.add_argument("--minutes", type=float, default=10.0, help="minutes of soak and hours")
     parser.add_argument(
         "--meshes",
         type=Path,
@@ -110,6 +111,9 @@ def main() -> None:
             continue
         if name == FAILURES:
             print(failures.run(Path(__file__).with_name("results") / "failures.md"))
+            continue
+        if name == HOURS:
+            print(hours.run(arguments.minutes, Path(__file__).with_name("results") / "hours.md"))
             continue
         if name == GATE:
             text, is_good = gate.run(is_new=arguments.new)

@@ -22,19 +22,20 @@ def memory_by_process(service: int) -> Mapping[str, int]:
     system's cache: psutil's PSS has them too, and its USS those that only one process maps.
     """
     api = Process(service)
-    found, seen = {"API": _anonymous(service)}, dict.fromkeys(KINDS.values(), 0)
+    found, seen = {"API": anonymous(service)}, dict.fromkeys(KINDS.values(), 0)
     for process in sorted(api.children(recursive=True), key=lambda process: process.pid):
         try:
             command = " ".join(process.cmdline())
             kind = next((kind for text, kind in KINDS.items() if text in command), "other")
             seen[kind] = seen.get(kind, 0) + 1
-            found[f"{kind} {seen[kind]}"] = _anonymous(process.pid)
+            found[f"{kind} {seen[kind]}"] = anonymous(process.pid)
         except (NoSuchProcess, FileNotFoundError, ProcessLookupError):
             continue  # it has just ended
     return found
 
 
-def _anonymous(pid: int) -> int:
+def anonymous(pid: int) -> int:
+    """Return the bytes of anonymous memory of a process; of shared pages, its part."""
     rollup = Path(f"/proc/{pid}/smaps_rollup").read_text()
     sizes = re.findall(r"^(?:Pss_Anon|Pss_Shmem|SwapPss): +(\d+) kB", rollup, re.MULTILINE)
     return 1024 * sum(map(int, sizes))
