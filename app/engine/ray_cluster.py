@@ -18,6 +18,11 @@ _MOST_HOSTS = 32
 _MOST_CALLS = 100_000
 """Calls at one host: they wait in the queue of its engine, where callers take turns"""
 _CHECK_S, _CHECK_TIMEOUT_S = 1.0, 5.0
+_RECOVERY_S = 15
+"""For which a controller that took over waits for hosts, and tells of none new; 30 by default.
+
+It waits for those, too, that no machine is there for.
+"""
 VARIABLES = {
     "RAY_SERVE_USE_GRPC_BY_DEFAULT": "1",  # a third of the time, and a host hears of lost callers
     "RAY_SERVE_REPLICA_GRPC_MAX_MESSAGE_LENGTH": str(2**31 - 1),  # 4 MiB otherwise
@@ -80,7 +85,8 @@ def _deploy() -> None:
 
     from app.engine.ray_host import Host
 
-    serve.start(proxy_location="Disabled")
+    recovery = {"env_vars": {"RAY_SERVE_SLOW_STARTUP_WARNING_S": str(_RECOVERY_S)}}
+    serve.start(proxy_location="Disabled", controller_options={"runtime_env": recovery})
     if APPLICATION in serve.status().applications:
         return
     router: dict[str, Any] = {
