@@ -39,9 +39,10 @@ def shortest_nearby(
     tight = straightened_curve(curve, control.for_part(0, 2), free_ends=free_ends)
     for part in islice(rounds(control.for_part(1, 2)), MOST_PASSES):
         nearer = _through_tubes(tight, part.for_part(0, 2))
+        nearer = straightened_curve(nearer, part.for_part(1, 2), free_ends=free_ends)
         if nearer.length >= tight.length * (1.0 - SHORTER):
             break
-        tight = straightened_curve(nearer, part.for_part(1, 2), free_ends=free_ends)
+        tight = nearer
     return tight
 
 
