@@ -270,6 +270,8 @@ def test_what_belongs_to_another_surface_is_refused(surfaces, files, masks, tmp_
         gc.brain.load_cortex({"left": surfaces["left"]}, np.ones(320), "passes")
     with pytest.raises(gc.errors.OtherSurface, match="99 values, but the surfaces have 324"):
         gc.brain.load_cortex(surfaces, np.ones(99), "passes")
+    with pytest.raises(gc.errors.InvalidArgument, match=r"values have shape \(1, 2, 324\)"):
+        gc.brain.load_maps(np.ones((1, 2, 324)), gc.brain.load_cortex(surfaces))
     with pytest.raises(gc.errors.OtherSurface, match="the roi lists vertex 324"):
         gc.brain.load_cortex(surfaces, [324], "passes")
     rows = "#!ascii label\n1\n162 0 0 0 0\n"
@@ -330,3 +332,5 @@ def test_damaged_files_are_refused_with_their_name(files, tmp_path):
             gc.brain.load_cortex(files[:1], path, "passes")
         with pytest.raises(gc.errors.InvalidArgument, match=r"must end in|is no CIFTI-2 file"):
             gc.brain.load_matrix(path)
+    with pytest.raises(gc.errors.InvalidArgument, match=r"cannot read .*none\.curv"):
+        gc.brain.load_cortex(files[:1], tmp_path / "none.curv", "passes")
