@@ -38,8 +38,8 @@ KINDS = {
 }
 """Kinds of processes by a text in their command lines"""
 OTHERS = "others of Ray"
-FILES = ("copies of meshes", "temporary files", "logs of Ray", "objects in the store")
-COPIES, TEMPORARY, LOGS, OBJECTS = FILES
+FILES = ("copies of meshes", "temporary files", "files of Ray", "objects in the store")
+COPIES, TEMPORARY, RAY, OBJECTS = FILES
 ABOUT = (
     "MiB of anonymous memory of all processes of a kind, of shared pages the share, and MiB of "
     "files: medians of a tenth of the time each. Handles are open files and connections."
@@ -97,7 +97,7 @@ def _sample(deployment: Deployment) -> Sample:
                 kind = next((kind for text, kind in KINDS.items() if text in command), OTHERS)
                 held[kind].add(anonymous(process.pid), process.num_fds())
     for path in deployment.folder.rglob("*"):
-        _add_file(held[COPIES if "copies" in path.parts else LOGS], path)
+        _add_file(held[COPIES if "copies" in path.parts else RAY], path)
     for path in Path(deployment.settings["TMPDIR"]).rglob("*"):
         _add_file(held[TEMPORARY], path)
     for size in deployment.s3.sizes(deployment.settings["GEODESIC_STORE"]).values():

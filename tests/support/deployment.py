@@ -158,9 +158,9 @@ class Deployment:
         """Start all parts; a replica makes the store, which nodes need."""
         self.head.start()
         self._wait_for(lambda: b"Ray runtime started" in self.head.log.read_bytes())
-        for replica in self.replicas:
+        for replica in self.replicas:  # one by one: Ray gives each start 30 s
             replica.start()
-        self._wait_for(lambda: all(replica.listens() for replica in self.replicas))
+            self._wait_for(replica.listens)
         for node in self.nodes:
             node.start()
 

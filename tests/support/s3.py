@@ -70,7 +70,10 @@ class S3:
     def sizes(self, url: str) -> dict[str, int]:
         """Return the bytes of the objects of a store, by name."""
         prefix = self._prefix(url)
-        found = self.client.list_objects_v2(Bucket="bucket", Prefix=prefix).get("Contents", [])
+        pages = self.client.get_paginator("list_objects_v2").paginate(
+            Bucket="bucket", Prefix=prefix
+        )
+        found = (each for page in pages for each in page.get("Contents", []))
         return {each["Key"].removeprefix(prefix): each["Size"] for each in found}
 
     def names(self, url: str) -> set[str]:
