@@ -131,7 +131,7 @@ def _report(trial: Trial, samples: Sequence[Sample], minutes: float) -> str:
             about,
             f"_{machine()}_",
             table(
-                ["requests", "wrong", "promised", "lost", "ended by themselves"],
+                ["requests", "wrong or missing", "promised", "lost", "ended by themselves"],
                 [
                     [
                         f"{len(trial.exchanges):,}",
