@@ -1,8 +1,9 @@
-"""Curves pulled tight that are the shortest in a tube: on the faces they cross, and those beside.
+"""Curves pulled tight, and the shortest in their tubes.
 
-If a tube is a disc, each curve in it can be moved to any other with the same ends. So an exact
-search in the tube finds the shortest near a curve. If it is none, as where a curve meets itself or
-passes on both sides of a hole, the curve is halved.
+The tube of a curve is the faces that it crosses, and those that share a vertex with one. If it is a
+disc, each curve in it can be moved to any other with the same ends: an exact sweep of the tube
+finds the shortest near the curve. If it is none, as where a curve meets itself or goes around a
+hole, the curve is halved.
 """
 
 import math
