@@ -154,6 +154,8 @@ class View:
         kind = "touchEnd"
         if points:
             kind = "touchStart" if len(points) > self._fingers else "touchMove"
+        if self._fingers == 0:
+            self._time = max(self._time, time())  # events of before the last frame crash Chromium
         self._time += after
         event = {"type": kind, "touchPoints": points, "timestamp": self._time}
         self._devtools.send("Input.dispatchTouchEvent", event)
