@@ -70,7 +70,8 @@ def warning_in(header: str | None, words: str) -> Callable[[Route], None]:
     """Return what adds a warning to answers: in a header, or in JSON."""
 
     def add(route: Route) -> None:
-        answer = route.fetch()
+        asked = {**route.request.headers, "prefer": ""}  # never a job: its results come elsewhere
+        answer = route.fetch(headers=asked)
         if header and "application/json" not in answer.headers["content-type"]:
             headers = {**answer.headers, header: json.dumps([words])}
             route.fulfill(response=answer, headers=headers)
