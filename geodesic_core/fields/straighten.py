@@ -30,7 +30,7 @@ _SLICE_CROSSINGS = 2**18
 """Crossings of edges that are passed between two checkpoints, some 50 ms."""
 
 
-class _Line(NamedTuple):
+class Line(NamedTuple):
     """The segments of a curve, from a point to the next."""
 
     faces: Longs
@@ -39,13 +39,19 @@ class _Line(NamedTuple):
     """(N, 3) weights in them"""
     ends: Floats
 
-    def part(self, first: int, end: int) -> "_Line":
-        """Return some of the segments."""
-        return _Line(self.faces[first:end], self.starts[first:end], self.ends[first:end])
+    @classmethod
+    def of(cls, curve: SurfaceCurve) -> "Line":
+        """Return those of a curve."""
+        _, starts, ends = curve._segments()
+        return cls(curve._inner_faces, starts, ends)
 
-    def turned(self, first: int) -> "_Line":
+    def part(self, first: int, end: int) -> "Line":
+        """Return some of the segments."""
+        return Line(self.faces[first:end], self.starts[first:end], self.ends[first:end])
+
+    def turned(self, first: int) -> "Line":
         """Return the segments of a closed curve that begins with another one."""
-        return _joined([self.part(first, len(self.faces)), self.part(0, first)])
+        return joined([self.part(first, len(self.faces)), self.part(0, first)])
 
     def strips(self, mesh: TriangleMesh) -> list[Strip]:
         """Return strips along the line: more than one where it passes from one sheet to another."""
@@ -57,13 +63,14 @@ class _Line(NamedTuple):
 
     def first_break(self, mesh: TriangleMesh) -> int | None:
         """Return the first segment of a closed curve that no strip joins to those before."""
-        again = _joined([self, self.part(0, 1)])
+        again = joined([self, self.part(0, 1)])
         first = funnel.strip_along(mesh.topology, *again, 0)[1]
         return None if first == len(again.faces) else first % len(self.faces)
 
 
-def _joined(lines: Sequence[_Line]) -> _Line:
-    return _Line(
+def joined(lines: Sequence[Line]) -> Line:
+    """Return lines, each from the end of the one before, as one."""
+    return Line(
         np.concatenate([line.faces for line in lines]),
         np.concatenate([line.starts for line in lines]),
         np.concatenate([line.ends for line in lines]),
@@ -86,20 +93,28 @@ def straightened_curve(
     """
     if free_ends and curve.closed:
         raise InvalidArgument("no end of the curve is free: it is closed")
-    control.check_memory(_BYTES_OF_SEGMENT * len(curve.faces))
-    pieces = None
+    if len(curve.faces):
+        mesh, line = curve.on_mesh(), Line.of(curve)
+        return straightened_line(mesh, line, control, closed=curve.closed, free_ends=free_ends)
+    if curve.closed:
+        raise _shrunk()
+    return curve
+
+
+def straightened_line(
+    mesh: TriangleMesh, line: Line, control: Control, *, closed: bool, free_ends: bool
+) -> SurfaceCurve:
+    """Return the curve of a line pulled tight, see `straightened_curve`."""
+    control.check_memory(_BYTES_OF_SEGMENT * len(line.faces))
+    pieces = np.inf
     for part in rounds(control):
         part.checkpoint(0.0)
-        mesh, starts, ends = curve._segments()
-        line = _Line(curve._inner_faces, starts, ends)
-        if len(line.faces) == 0:
-            break
-        first = line.first_break(mesh) if curve.closed else 0
+        first = line.first_break(mesh) if closed else 0
         if first is None:
             return straight_loop(mesh, line.strips(mesh)[0], part)
         strips = line.turned(first).strips(mesh)
         is_free = _free_ends_of(mesh, strips) if free_ends else (False, False)
-        if pieces is not None and len(strips) >= pieces:
+        if len(strips) >= pieces:
             break
         # Where a piece between two sheets has shrunk to nothing, those beside it may be one
         pieces = len(strips)
@@ -112,10 +127,11 @@ def straightened_curve(
             )
             for i, strip in enumerate(strips)
         ]
-        curve = curve_in(mesh, pulled, closed=curve.closed)
-        if pieces == 1:
+        curve = curve_in(mesh, pulled, closed=closed)
+        if pieces == 1 or len(curve.faces) == 0:
             break
-    if curve.closed and len(curve.faces) == 0:
+        line = Line.of(curve)
+    if closed and len(curve.faces) == 0:
         raise _shrunk()
     return curve
 
@@ -243,7 +259,7 @@ def _junctions(mesh: TriangleMesh, strip: Strip) -> Iterator[tuple[int, Ints]]:
     topology, (first, last), (start, end) = mesh.topology, strip.faces, strip.weights
     corners = np.flatnonzero(end == 1.0)
     if first == last or len(corners) == 0:
-        line = _Line(strip.faces[::-1].copy(), np.stack([end, start]), np.stack([end, start]))
+        line = Line(strip.faces[::-1].copy(), np.stack([end, start]), np.stack([end, start]))
         yield NEITHER, line.strips(mesh)[0].portals
         return
     corner = int(corners[0])
@@ -279,6 +295,6 @@ def portals_along(*curves: SurfaceCurve, closed: bool) -> Ints:
 
     If they are closed, also those around the point where they meet again.
     """
-    lines = [_Line(each._inner_faces, *each._segments()[1:]) for each in curves]
-    line = _joined([*lines, lines[0].part(0, 1)] if closed else lines)
+    lines = [Line.of(each) for each in curves]
+    line = joined([*lines, lines[0].part(0, 1)] if closed else lines)
     return line.strips(curves[0].on_mesh())[0].portals

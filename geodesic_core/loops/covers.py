@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from geodesic_core.arrays import Longs
+from geodesic_core.arrays import Floats, Longs
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidMesh
 from geodesic_core.kernels.mesh.half_edges import FANS, LENGTH, OPPOSITE, SEAM, TAIL
@@ -40,8 +40,13 @@ class Cover(NamedTuple):
         face = base.inner_face[[point.face_index]].astype(np.int64)
         given = np.array([point.face_index]), np.array([point.barycentric])
         weights = weights_in_faces(base.topology, base.faces, *given, face)
-        copy = np.searchsorted(self.copies, sheet * (len(base.topology.links) // 3) + face[0])
-        return self.mesh.point(SurfacePoint.face(int(copy), tuple(weights[0].tolist())))
+        return self.point_in(int(face[0]), weights[0], sheet)
+
+    def point_in(self, face: int, weights: Floats, sheet: int) -> SurfacePoint:
+        """Return the point over one of an inner face of the base, by its weights there."""
+        count = len(self.base.topology.links) // 3
+        copy = np.searchsorted(self.copies, sheet * count + face)
+        return self.mesh.point(SurfacePoint.face(int(copy), tuple(weights.tolist())))
 
     def lowered(self, path: SurfaceCurve, *, closed: bool = False) -> SurfaceCurve:
         """Return a path on the cover as a curve on the base."""

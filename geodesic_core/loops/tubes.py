@@ -13,14 +13,19 @@ import numpy as np
 
 from geodesic_core.arrays import Longs
 from geodesic_core.control import Control, rounds
-from geodesic_core.fields.path import EXACT, GeodesicPath, joined, traced_path
+from geodesic_core.fields.path import EXACT, traced_path
 from geodesic_core.fields.question import Question
-from geodesic_core.fields.straighten import straightened_curve
+from geodesic_core.fields.straighten import (
+    Line,
+    joined,
+    straightened_curve,
+    straightened_line,
+)
 from geodesic_core.fields.sweep_result import all_winners
 from geodesic_core.fields.sweeps import ExactSweep
 from geodesic_core.kernels.mesh.half_edges import BOUNDARY, FANS, SEAM, TAIL
 from geodesic_core.loops.covers import cover_of
-from geodesic_core.mesh.surface_curve import SurfaceCurve, curve_through, point_of, rows_of
+from geodesic_core.mesh.surface_curve import SurfaceCurve
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import MOST_PASSES, SHORTER
 
@@ -38,68 +43,54 @@ def shortest_nearby(
         As in `straightened_curve`.
     """
     tight = straightened_curve(curve, control.for_part(0, 2), free_ends=free_ends)
+    mesh, closed = tight.on_mesh(), tight.closed
     for part in islice(rounds(control.for_part(1, 2)), MOST_PASSES):
-        nearer = _through_tubes(tight, part.for_part(0, 2))
-        nearer = straightened_curve(nearer, part.for_part(1, 2), free_ends=free_ends)
+        if len(tight.faces) == 0:
+            break
+        line = _through_tubes(mesh, Line.of(tight), part.for_part(0, 2), closed=closed)
+        last = part.for_part(1, 2)
+        nearer = straightened_line(mesh, line, last, closed=closed, free_ends=free_ends)
         if nearer.length >= tight.length * (1.0 - SHORTER):
             break
         tight = nearer
     return tight
 
 
-def _through_tubes(curve: SurfaceCurve, control: Control) -> SurfaceCurve:
-    """Return a curve whose parts are the shortest in their tubes."""
-    count = len(curve.faces)
-    parts = [(0, count // 2), (count // 2, count)] if curve.closed else [(0, count)]
-    parts, legs = [part for part in parts if part[0] < part[1]], []
+def _through_tubes(mesh: TriangleMesh, line: Line, control: Control, *, closed: bool) -> Line:
+    """Return a line whose parts are the shortest in their tubes."""
+    count = len(line.faces)
+    middle = count // 2 if closed else 0
+    parts = [line.part(0, middle), line.part(middle, count)]
+    found = []
     while parts:
         control.checkpoint(0.0)
-        first, end = parts.pop(0)
-        leg = _leg(curve, first, end)
-        if end - first > 1:
-            shortest = _shortest_in_tube(leg, control)
-            if shortest is None:
-                middle = (first + end) // 2
-                parts[:0] = [(first, middle), (middle, end)]
-                continue
-            leg = min(leg, shortest, key=lambda path: path.length)
-        legs.append(leg)
-    if not legs:
-        return curve
-    path = joined(legs)
-    if not curve.closed:
-        return path
-    located = rows_of(path.located, slice(0, -1))
-    return SurfaceCurve(path.mesh, path.faces, True, path.length, located)
+        part = parts.pop(0)
+        count = len(part.faces)
+        shortest = _shortest_in_tube(mesh, part, control) if count > 1 else part
+        if shortest is None:
+            parts[:0] = [part.part(0, count // 2), part.part(count // 2, count)]
+        else:
+            found.append(shortest)
+    return joined(found)
 
 
-def _leg(curve: SurfaceCurve, first: int, end: int) -> GeodesicPath:
-    """Return some segments of a curve as a path."""
-    mesh, starts, ends = curve._segments()
-    faces = curve._inner_faces[first:end]
-    points = np.append(faces, faces[-1]), np.vstack([starts[first:end], ends[end - 1]])
-    return _as_path(curve_through(mesh, *points, faces, closed=False))
-
-
-def _as_path(curve: SurfaceCurve) -> GeodesicPath:
-    return GeodesicPath(**vars(curve), error_bound=EXACT, steps=None)
-
-
-def _shortest_in_tube(leg: GeodesicPath, control: Control) -> GeodesicPath | None:
-    """Return the shortest path in the tube of a path; None if the tube is no disc."""
-    mesh = leg.on_mesh()
+def _shortest_in_tube(mesh: TriangleMesh, line: Line, control: Control) -> Line | None:
+    """Return the shortest line in the tube of a line; None if the tube is no disc."""
     half_edges = len(mesh.topology.links)
     kept = np.zeros(half_edges // 3, bool)
-    kept[_tube(mesh, leg._inner_faces)] = True
-    cover = cover_of(mesh, np.zeros((1, half_edges), np.int64), kept, control)
+    kept[_tube(mesh, line.faces)] = True
+    in_one_sheet = np.broadcast_to(np.int64(0), (1, half_edges))
+    cover = cover_of(mesh, in_one_sheet, kept, control)
     if not _is_disc(cover.mesh):
         return None
-    start, end = (cover.lifted(point_of(leg.located, i), 0) for i in (0, -1))
+    start = cover.point_in(int(line.faces[0]), line.starts[0], 0)
+    end = cover.point_in(int(line.faces[-1]), line.ends[-1], 0)
     control = control.holding(cover.mesh.nbytes)
     question = Question.of(cover.mesh, start, [end], math.inf, control)
     winners = all_winners(ExactSweep(question).run(control, "paths"))
     node = int(question.nodes.targets[0])
-    return _as_path(cover.lowered(traced_path(cover.mesh, winners, question.nodes, node, EXACT)))
+    path = traced_path(cover.mesh, winners, question.nodes, node, EXACT)
+    return Line.of(cover.lowered(path))
 
 
 def _tube(mesh: TriangleMesh, faces: Longs) -> Longs:
