@@ -1121,8 +1121,9 @@ def straighten(
     """Return a curve pulled tight: the shortest of those into which it can be moved, near it.
 
     Its ends stay, unless they are free. It is straight but for bends at vertices and at the
-    boundary, where neither side leaves it less than half a turn. None is shorter that stays on the
-    faces that it crosses and those that share a vertex with one; one beyond a hill may be.
+    boundary, where neither side leaves it less than half a turn. Where the faces that it crosses
+    and those that share a vertex with one form a disc, it is the shortest on them; a curve on the
+    other side of a hill may still be shorter.
 
     Parameters
     ----------
@@ -1155,7 +1156,7 @@ def straighten(
     Notes
     -----
     O(faces crossed) for each vertex that the curve moves past, and an exact sweep of the faces
-    beside it. 400 faces take twenty to forty milliseconds.
+    beside it. 400 faces take about ten milliseconds.
 
     Examples
     --------

@@ -41,8 +41,9 @@ OTHERS = "others of Ray"
 FILES = ("copies of meshes", "temporary files", "files of Ray", "objects in the store")
 COPIES, TEMPORARY, RAY, OBJECTS = FILES
 ABOUT = (
-    "MiB of anonymous memory of all processes of a kind, of shared pages the share, and MiB of "
-    "files: medians of a tenth of the time each. Handles are open files and connections."
+    "MiB of anonymous memory of all processes of a kind, with their share of shared pages, and MiB "
+    "of files. Each column is the median over a tenth of the time. Handles are open files and "
+    "connections."
 )
 MOMENTS = ("start", "¼", "½", "¾", "end")
 

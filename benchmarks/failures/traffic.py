@@ -35,7 +35,7 @@ NO_CONNECTION = (0, "")
 LOOK_S = 0.2
 RECONNECT_S = 1.0
 LONG = 20
-"""How much longer who asks long questions rests, where users do rest"""
+"""Times as long as others a user with long questions pauses"""
 ENDED = ("successful", "failed", "dismissed")
 
 

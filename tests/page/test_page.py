@@ -890,13 +890,16 @@ def test_by_keyboard_alone(view: View, sphere: str) -> None:
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_no_fault_of_access(view: View, knot: str, theme: str) -> None:
-    axe = ROOT / "app/web/node_modules/axe-core/axe.min.js"
+    axe = (ROOT / "app/web/node_modules/axe-core/axe.min.js").read_text()
     view.page.emulate_media(color_scheme="dark" if theme == "dark" else "light")
     asked = f"/?mesh={knot}&source=v0;v10&via=v7&target=v1000&shade=territories&barriers=3"
-    for address in ("/", asked):
+    for address, is_cut in (("/", False), (asked, False), (asked, True)):
+        view.page.set_viewport_size({"width": 1100, "height": 700})
         view.open(address)
+        if is_cut:
+            view.press("#cut-start")
         view.page.locator("details").evaluate_all("all => all.forEach(each => each.open = true)")
-        view.page.evaluate(axe.read_text())
+        view.page.evaluate(axe)
         for width, height in ((1100, 700), (360, 640)):
             view.page.set_viewport_size({"width": width, "height": height})
             view.page.locator("#folded").evaluate("each => each.hidden = false")
@@ -905,4 +908,4 @@ def test_no_fault_of_access(view: View, knot: str, theme: str) -> None:
                 (each["id"], [node["html"][:120] for node in each["nodes"]])
                 for each in found["violations"]
             ]
-            assert faults == [], (address, width)
+            assert faults == [], (address, is_cut, width)

@@ -3,7 +3,7 @@
 import pytest
 from playwright.sync_api import FloatRect
 
-from tests.support.viewing import View
+from tests.support.viewing import PLAIN, View
 
 pytestmark = pytest.mark.file_slice(1)
 
@@ -69,8 +69,13 @@ FOLDED = (
 
 
 @pytest.mark.parametrize("selector", [".segments span", "#panel summary", "#panel button"])
-def test_labels_are_in_the_middle_of_what_a_finger_presses(phone: View, selector: str) -> None:
-    phone.open()
+def test_labels_are_in_the_middle_of_what_a_finger_presses(
+    phone: View, knot: str, selector: str
+) -> None:
+    phone.open(f"/?mesh={knot}&source=v0&target=v1000&{PLAIN}")
+    phone.press("#cut-start")
+    phone.click()
+    phone.reach("#distances")
     for each in FOLDED:
         if phone.page.get_attribute(f"#{each}", "open") is None:
             phone.unfold(each)

@@ -43,41 +43,43 @@ def test_two_clicks_make_a_path(device: View, sphere: str) -> None:
     assert after == before
 
 
-def test_ten_steps_are_undone_and_done_again(view: View, sphere: str) -> None:
-    view.open(f"/?mesh={sphere}&{PLAIN}")
-    told: list[dict[str, list[str]]] = [query_of(view)]
+def test_ten_steps_are_undone_and_done_again(device: View, sphere: str) -> None:
+    device.open(f"/?mesh={sphere}&{PLAIN}")
+    told: list[dict[str, list[str]]] = [query_of(device)]
 
     def step(act: Callable[[], object]) -> None:
         act()
-        view.wait()
-        told.append(query_of(view))
+        device.wait()
+        told.append(query_of(device))
         assert told[-1] != told[-2]
 
-    step(lambda: view.click(-80, 0))
-    step(lambda: view.click(80, 0))
-    step(lambda: view.drag((80, 0), (60, 50), (0, 60)))
-    step(lambda: view.click(0, -60, "Alt"))
-    view.press("#tools >> text=Start")
-    step(lambda: view.click(-60, -60))
-    view.press("#tools >> text=Barrier")
-    step(lambda: view.drag((20, 20), (40, 40)))
-    step(lambda: view.reach("#palette").select_option("magma"))
-    step(lambda: view.press("#distances"))
-    step(lambda: view.press("#places >> [aria-label='Remove A']"))
-    step(lambda: view.press("#clear"))
+    step(lambda: device.click(-80, 0))
+    step(lambda: device.click(80, 0))
+    step(lambda: device.drag((80, 0), (60, 50), (0, 60)))
+    step(lambda: device.click(0, -60, "Alt"))
+    device.press("#tools >> text=Start")
+    device.fold()
+    step(lambda: device.click(-60, -60))
+    device.press("#tools >> text=Barrier")
+    device.fold()
+    step(lambda: device.drag((20, 20), (40, 40)))
+    step(lambda: device.reach("#palette").select_option("magma"))
+    step(lambda: device.press("#distances"))
+    step(lambda: device.press("#places >> [aria-label='Remove A']"))
+    step(lambda: device.press("#clear"))
     assert len(told) == 11
     for before in reversed(told[:-1]):
-        view.page.keyboard.press("Control+z")
-        assert query_of(view) == before
-    assert view.page.is_disabled("#undo")
+        device.page.keyboard.press("Control+z")
+        assert query_of(device) == before
+    assert device.page.is_disabled("#undo")
     for after in told[1:]:
-        view.press("#redo")
-        assert query_of(view) == after
-    view.press("#undo")
-    view.page.keyboard.press("Control+Shift+z")
-    view.wait()
-    assert query_of(view) == told[-1]
-    assert not view.page.is_visible("#legend")
+        device.press("#redo")
+        assert query_of(device) == after
+    device.press("#undo")
+    device.page.keyboard.press("Control+Shift+z")
+    device.wait()
+    assert query_of(device) == told[-1]
+    assert not device.page.is_visible("#legend")
 
 
 def test_a_closed_isoline_is_drawn_closed(

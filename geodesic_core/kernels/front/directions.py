@@ -96,7 +96,10 @@ def turns_at_site(geometry: Floats, sites: Sites, k: int, h: int) -> tuple[float
 
 @inlined
 def lit_from_vertex(wave: View, window: Window, v: int, h: int) -> Window:
-    """Return a window from vertex v, the tail of h, over the far edge of the face of h."""
+    """Return a window from vertex v, the tail of h, with its turn if it carries one.
+
+    It lies on the far edge of the face of h.
+    """
     if directed(wave):
         is_source = wave.vertices.winner_ints[WINNER * v + ENTRY_EDGE] < 0
         if is_source or wave.bounds.directed_from_bends:
@@ -106,7 +109,7 @@ def lit_from_vertex(wave: View, window: Window, v: int, h: int) -> Window:
 
 @inlined
 def lit_from_site(wave: View, window: Window, k: int, h: int) -> Window:
-    """Return a window from the site of row k, over the edge h of its face."""
+    """Return a window from the site of row k over edge h of its face, with its turn."""
     if directed(wave):
         return turned(window, turns_at_site(wave.mesh.geometry, wave.sites, k, h)[1], 0)
     return window
@@ -147,7 +150,7 @@ def seen_in_mirror(wave: View, window: Window) -> Window:
 
 @inlined
 def note_direction(wave: View, node: int, window: Window) -> None:
-    """Note the turn of the window that reaches a node first. Modifies the node."""
+    """Note at a node the turn of the window by which it is reached. Modifies the node."""
     if directed(wave):
         wave.vertices.turn[node], wave.vertices.mirrored[node] = window.turn, window.mirrored
 
