@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats
 from geodesic_core.brain.files import nibabel, reading
-from geodesic_core.brain.structures import Structure, only, side_of_image
+from geodesic_core.brain.structures import Side, Structure, only, side_named, side_of_image
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument, OtherSurface
 from geodesic_core.io.annotation import read_annotation
@@ -122,16 +122,20 @@ def _read(path: Path, structures: Sequence[Structure]) -> list[Maps]:
         if file.suffix in _OPENERS:
             return _by_structure(_OPENERS[file.suffix](file.data), structures)
         structure = only(structures, "it", _REMEDY)
+        _check_side(side_named(path.name), structure)
         if file.suffix in _OF_ONE:
             return [_OF_ONE[file.suffix](file.data, structure)]
         values = nibabel("freesurfer", "reading values of FreeSurfer").read_morph_data(path)
         return [Maps(_rows(values))]
 
 
+def _check_side(told: Side | None, structure: Structure) -> None:
+    if told not in (None, structure.side):
+        raise InvalidArgument(f"it is of the {told} hemisphere, and the surface of the other one")
+
+
 def _gifti(image: Any, structure: Structure) -> Maps:
-    side = side_of_image(image)
-    if side not in (None, structure.side):
-        raise InvalidArgument(f"it is of the {side} hemisphere, and the surface of the other one")
+    _check_side(side_of_image(image), structure)
     arrays = [np.asarray(array.data) for array in image.darrays]
     if not arrays or any(len(array) != len(arrays[0]) for array in arrays):
         raise InvalidArgument("it holds no values at vertices")

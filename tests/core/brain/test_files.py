@@ -281,6 +281,10 @@ def test_what_belongs_to_another_surface_is_refused(surfaces, files, masks, tmp_
     paths = masks_as("shape.gii", masks, tmp_path, None)
     with pytest.raises(gc.errors.InvalidArgument, match="of the right hemisphere, and the surface"):
         gc.brain.load_cortex(files, paths[::-1], "passes")
+    for name in ("rh.cortex.label", "rh.aparc.annot", "rh.thickness"):  # FreeSurfer's only tell so
+        (tmp_path / name).write_text(rows)
+        with pytest.raises(gc.errors.InvalidArgument, match="it is of the right hemisphere"):
+            gc.brain.load_cortex(files[:1], tmp_path / name, "passes")
     cortex = gc.brain.load_cortex({"left": surfaces["left"]})
     gc.brain.write_maps(tmp_path / "left.dscalar.nii", cortex, cortex.areas, ["area"])
     with pytest.raises(gc.errors.InvalidArgument, match="nothing of the right cortex"):
