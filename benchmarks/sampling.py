@@ -92,7 +92,7 @@ def _curves(inputs: Inputs, runs: int) -> Section:
                 f"{1e3 * np.median(ours):.1f}",
                 f"{1e3 * np.median(theirs):.1f}",
                 f"{sum(ratio <= NO_LONGER for ratio in ratios)} of {len(ratios)}",
-                f"{sum(ratio < 2.0 - NO_LONGER for ratio in ratios)}",
+                f"{sum(ratio * NO_LONGER < 1.0 for ratio in ratios)}",
                 f"{100.0 * (1.0 - min(ratios)):.3f}",
             ]
         )

@@ -86,7 +86,7 @@ class Question:
     @cached_property
     def reachable(self) -> int:
         """Number of vertices in the components of the sources."""
-        return int(np.isin(self.mesh.components, self.nodes.components).sum())
+        return int(self.mesh.component_sizes[list(self.nodes.components)].sum())
 
     def connects(self, point: SurfacePoint) -> bool:
         """Tell whether a canonical point is in the component of a source."""

@@ -494,6 +494,11 @@ class TriangleMesh:
         return self.topology.component
 
     @cached_property
+    def component_sizes(self) -> Longs:
+        """(C,) int64: the number of vertices of each connected component."""
+        return np.bincount(self.components)
+
+    @cached_property
     def inner_face(self) -> Ints:
         """(F,) int32: the topology's number of each face; -1 of one that is not in the surface.
 

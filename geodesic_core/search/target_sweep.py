@@ -69,7 +69,6 @@ class TargetSweep:
     def __init__(self, mesh: TriangleMesh, sweep_of: SweepOf = ExactSweep) -> None:
         self.mesh = mesh
         self._sweep_of = sweep_of
-        self._sizes = np.bincount(mesh.components)
         self._wave: Wavefront | None = None
         self._ends: Ends | None = None
         """Those that the memory is prepared for"""
@@ -216,7 +215,7 @@ class TargetSweep:
 
     def _share(self, rows: Rows) -> Callable[[Wavefront], float]:
         """Return the share of the rows that is done, as a function of the state."""
-        shown, sizes = 0.0, self._sizes
+        shown, sizes = 0.0, self.mesh.component_sizes
 
         def share(wave: Wavefront) -> float:
             nonlocal shown

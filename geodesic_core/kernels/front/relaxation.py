@@ -147,6 +147,11 @@ def nearest_sources(distance: Floats, winner_ints: Ints, source_index: Ints) -> 
     source after it emitted. O(N).
     """
     result = np.full(len(distance), -1, np.int32)
+    if not source_index.any():  # there is one source, and no chain to follow
+        for v in range(len(distance)):
+            if distance[v] < math.inf:
+                result[v] = 0
+        return result
     for start in range(len(distance)):
         if distance[start] == math.inf:
             continue
