@@ -2,6 +2,7 @@
 
 import gc
 import os
+import socket
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -41,6 +42,7 @@ def serve(
     ] = None,
 ) -> None:
     """Serve geodesics over HTTP until interrupted; settings are GEODESIC_… variables."""
+    _refuse_taken_port(host, port)
     if not sys.stderr.isatty():
         os.environ["GEODESIC_QUIET"] = "1"  # lines are objects then; the log says that it compiles
     if (engine or os.environ.get("GEODESIC_ENGINE", "local")) == "local":
@@ -87,6 +89,20 @@ def _in_cluster_if_asked(settings: "Settings") -> Iterator[None]:
         except ClusterError as error:
             raise Failure(str(error)) from error
         yield
+
+
+def _refuse_taken_port(host: str, port: int) -> None:
+    """Refuse an address where one cannot listen: the server itself would find out at the end."""
+    try:
+        addresses = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+        for family, kind, protocol, _, address in addresses:
+            with socket.socket(family, kind, protocol) as probe:
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                probe.bind(address)
+    except OSError as error:
+        raise Failure(
+            f"cannot listen on {host}, port {port}: {error.strerror}; --port takes another one"
+        ) from error
 
 
 def _refuse_without_keys(host: str, settings: "Settings") -> None:

@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Coroutine
 from functools import wraps
-from typing import Any, Generic, ParamSpec, Protocol, TypeVar, overload
+from inspect import signature
+from typing import Any, Generic, ParamSpec, Protocol, TypeVar, get_args, overload
 
 from geodesic_client.flow import Flow
 
@@ -31,7 +32,9 @@ class Method(Generic[P, T]):
 
     def __init__(self, begin: Callable[P, Flow[T]]) -> None:
         self._begin = begin
-        self.__doc__ = begin.__doc__
+        of_begin = signature(begin)
+        *_, outcome = get_args(of_begin.return_annotation)
+        self._signature = of_begin.replace(return_annotation=outcome)
 
     @overload
     def __get__(self, instance: Runner, owner: type) -> Callable[P, T]: ...
@@ -40,15 +43,16 @@ class Method(Generic[P, T]):
         self, instance: AsyncRunner, owner: type
     ) -> Callable[P, Coroutine[Any, Any, T]]: ...
     @overload
-    def __get__(self, instance: None, owner: type) -> "Method[P, T]": ...
+    def __get__(self, instance: None, owner: type) -> Callable[..., T]: ...
     def __get__(self, instance: Any, owner: type) -> Any:
-        """Return the function that runs on an instance."""
-        if instance is None:
-            return self
-        run = instance.run if hasattr(instance, "run") else instance.run_async
+        """Return the function that runs on an instance; of a class, one for `help` alone."""
+        run = getattr(instance, "run", None) or getattr(instance, "run_async", None)
 
         @wraps(self._begin)
         def call(*args: P.args, **kwargs: P.kwargs) -> Any:
+            if run is None:
+                raise TypeError(f"{self._begin.__name__} is called on a client, not on its class")
             return run(self._begin(*args, **kwargs))
 
+        call.__signature__ = self._signature  # type: ignore[attr-defined]
         return call

@@ -3,6 +3,7 @@
 import asyncio
 import json
 import pickle
+from inspect import signature
 
 import httpx2
 import numpy as np
@@ -10,8 +11,10 @@ import pytest
 from geodesic_client import (
     AsyncClient,
     Client,
+    Distances,
     ErrorBound,
     GeodesicClientError,
+    Job,
     ProblemError,
     StoredMatrix,
     UnreachableError,
@@ -316,3 +319,11 @@ def test_rows_of_a_matrix_can_be_changed() -> None:
 def test_methods_are_documented(name: str) -> None:
     assert getattr(Client, name).__doc__
     assert getattr(Service().client(), name).__name__ == name
+
+
+def test_help_tells_what_a_method_returns():
+    assert signature(Client.job).return_annotation is Job
+    assert signature(Client.distances).return_annotation is Distances
+    assert str(signature(AsyncClient("http://127.0.0.1").job)).startswith("(job_id: str) -> ")
+    with pytest.raises(TypeError, match="job is called on a client"):
+        Client.job("id")
