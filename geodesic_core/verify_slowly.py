@@ -14,8 +14,8 @@ from itertools import permutations, product
 from typing import Any, NamedTuple
 
 import numpy as np
-from flint import arb, ctx
 
+from geodesic_core.extras import extra
 from geodesic_core.verify import (
     Array,
     Proof,
@@ -26,6 +26,9 @@ from geodesic_core.verify import (
     parser,
     refuse_unless,
 )
+
+with extra("proof", "python-flint", "verify_slowly"):
+    from flint import arb, ctx
 
 BITS = 200
 """Of the midpoints of balls; what is left of rounding is far below that of doubles"""
