@@ -46,8 +46,8 @@ Surfaces = Annotated[
 Roi = Annotated[
     list[Path] | None,
     typer.Option(
-        help="The vertices that count: a mask, labels or a list, for each surface in their order "
-        "(repeat the option), or one CIFTI file for both. Needs --wall."
+        help="The vertices that count: a mask, labels or FreeSurfer's .label, for each surface in "
+        "their order (repeat the option), or one CIFTI file for both. Needs --wall."
     ),
 ]
 Wall = Annotated[

@@ -63,6 +63,8 @@ def _checked(maps: Maps, structure: Structure) -> Maps:
     are = "of another subject or resolution"
     if found == structure.faces:
         are = "one for each face, and must be by vertex"
+    elif found == 2 * count:
+        are = "perhaps of both hemispheres, which then need both surfaces"
     of = f"the {count} vertices of the {structure.side} surface"
     raise OtherSurface(f"there are {found} values for {of}: they are {are}", found, count)
 

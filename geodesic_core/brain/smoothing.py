@@ -87,7 +87,7 @@ def smooth(
     missing = np.argwhere(~np.isfinite(inside))
     if len(missing):
         vertex = int(cortex.region[missing[0, -1]])
-        raise InvalidArgument(f"{cortex.in_words(vertex)} has no finite value")
+        raise InvalidArgument(f"{cortex.in_words(vertex)} has no finite value: a roi leaves it out")
     sigma = fwhm / _FWHM
     near: Any = distance_matrix(
         cortex.mesh,

@@ -268,6 +268,8 @@ def test_what_belongs_to_another_surface_is_refused(surfaces, files, masks, tmp_
         gc.brain.load_cortex({"left": surfaces["left"]}, np.ones(len(other.vertices)), "passes")
     with pytest.raises(gc.errors.OtherSurface, match="one for each face, and must be by vertex"):
         gc.brain.load_cortex({"left": surfaces["left"]}, np.ones(320), "passes")
+    with pytest.raises(gc.errors.OtherSurface, match="perhaps of both hemispheres"):
+        gc.brain.load_cortex({"left": surfaces["left"]}, np.ones(324), "passes")
     with pytest.raises(gc.errors.OtherSurface, match="99 values, but the surfaces have 324"):
         gc.brain.load_cortex(surfaces, np.ones(99), "passes")
     with pytest.raises(gc.errors.InvalidArgument, match=r"values have shape \(1, 2, 324\)"):
