@@ -42,7 +42,6 @@ def serve(
     ] = None,
 ) -> None:
     """Serve geodesics over HTTP until interrupted; settings are GEODESIC_… variables."""
-    _refuse_taken_port(host, port)
     if not sys.stderr.isatty():
         os.environ["GEODESIC_QUIET"] = "1"  # lines are objects then; the log says that it compiles
     if (engine or os.environ.get("GEODESIC_ENGINE", "local")) == "local":
@@ -58,6 +57,7 @@ def serve(
     gc.enable()
     settings = read_settings(engine=engine, store=store, state=state)
     _refuse_without_keys(host, settings)
+    _refuse_taken_port(host, port)
     logs.install(settings.log_format)
     try:
         app = create_app(settings)
