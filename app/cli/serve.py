@@ -1,5 +1,6 @@
 """``geodesic serve``."""
 
+import errno
 import gc
 import os
 import socket
@@ -92,7 +93,7 @@ def _in_cluster_if_asked(settings: "Settings") -> Iterator[None]:
 
 
 def _refuse_taken_port(host: str, port: int) -> None:
-    """Refuse an address where one cannot listen: the server itself would find out at the end."""
+    """Refuse a port that another server has: ours would find out after its workers have started."""
     try:
         addresses = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
         for family, kind, protocol, _, address in addresses:
@@ -100,9 +101,8 @@ def _refuse_taken_port(host: str, port: int) -> None:
                 probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
                 probe.bind(address)
     except OSError as error:
-        raise Failure(
-            f"cannot listen on {host}, port {port}: {error.strerror}; --port takes another one"
-        ) from error
+        if error.errno == errno.EADDRINUSE:
+            raise Failure(f"port {port} of {host} is in use: choose another by --port") from error
 
 
 def _refuse_without_keys(host: str, settings: "Settings") -> None:

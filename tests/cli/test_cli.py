@@ -1132,20 +1132,20 @@ def test_serve_refuses_wrong_settings(run: Run, monkeypatch: pytest.MonkeyPatch)
 def test_serve_on_other_addresses_asks_for_keys(
     run: Run, served: list[uvicorn.Config], monkeypatch: pytest.MonkeyPatch, host: str
 ) -> None:
-    ran = run("serve", "--host", host)
+    ran = run("serve", "--host", host, "--port", 0)
     assert ran.code == 2
     assert "GEODESIC_API_KEYS" in error_line(ran)
     assert "GEODESIC_AUTH=off" in error_line(ran)
     assert not served
 
     monkeypatch.setenv("GEODESIC_API_KEYS", "alice:0123456789abcdef")
-    assert run("serve", "--host", host).code == 0
+    assert run("serve", "--host", host, "--port", 0).code == 0
     monkeypatch.setenv("GEODESIC_AUTH", "off")
-    ran = run("serve", "--host", host)
+    ran = run("serve", "--host", host, "--port", 0)
     assert ran.code == 2
     assert "GEODESIC_AUTH is off, but GEODESIC_API_KEYS has keys" in error_line(ran)
     monkeypatch.delenv("GEODESIC_API_KEYS")
-    assert run("serve", "--host", host).code == 0
+    assert run("serve", "--host", host, "--port", 0).code == 0
     assert [config.host for config in served] == [host, host]
 
 
@@ -1153,7 +1153,7 @@ def test_serve_on_other_addresses_asks_for_keys(
 def test_serve_on_this_machine_needs_none(
     run: Run, served: list[uvicorn.Config], host: str
 ) -> None:
-    assert run("serve", "--host", host).code == 0
+    assert run("serve", "--host", host, "--port", 0).code == 0
     assert [config.host for config in served] == [host]
 
 
