@@ -35,7 +35,7 @@ NO_CONNECTION = (0, "")
 LOOK_S = 0.2
 RECONNECT_S = 1.0
 LONG = 20
-"""Times as long as others a user with long questions pauses"""
+"""How many times longer a user with long questions pauses than others do"""
 ENDED = ("successful", "failed", "dismissed")
 
 

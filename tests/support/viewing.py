@@ -131,7 +131,7 @@ class View:
         if self.is_phone:
             for place in places:
                 self.touch(place)
-            # One that lifts while it moves flings: Chromium took the next tap for what stops that.
+            # If it lifts while it moves, Chromium sees a fling, and may swallow the next tap.
             self.touch(places[-1], after=REST_S)
             self.touch()
             self.wait()
