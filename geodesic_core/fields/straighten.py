@@ -267,7 +267,7 @@ def _junctions(mesh: TriangleMesh, strip: Strip) -> Iterator[tuple[int, Ints]]:
     room = int(topology.first_corner[v + 1] - topology.first_corner[v])
     for side in (LEFT, RIGHT):
         portals = np.empty(room, np.int32)
-        row, _ = funnel.around_vertex(topology, int(last), corner, int(first), side, portals, 0)
+        row = funnel.around_vertex(topology.links, int(last), corner, int(first), side, portals, 0)
         if row >= 0:
             yield side, portals[:row]
 

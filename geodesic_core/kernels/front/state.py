@@ -453,6 +453,4 @@ def _doubled(windows: Floats) -> Floats:
 def bytes_of(wave: Wavefront) -> int:
     """Memory of the state."""
     *groups, counters = wave
-    return counters.nbytes + sum(
-        part.nbytes for group in groups for part in group if isinstance(part, np.ndarray)
-    )
+    return counters.nbytes + sum([getattr(part, "nbytes", 0) for group in groups for part in group])

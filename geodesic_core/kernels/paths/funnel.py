@@ -21,8 +21,11 @@ from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
+    APEX_ANGLE,
+    BOUNDARY,
     COS_LEFT,
     COS_RIGHT,
+    FANS,
     HEAD,
     LENGTH,
     LENGTH_LEFT,
@@ -139,27 +142,27 @@ def strip_along(
         if f != g and corner >= 0:
             v = topology.links[3 * f + corner, TAIL]
             degree = topology.first_corner[v + 1] - topology.first_corner[v]
-            portals = with_room(portals, size, degree)
-            first = angles_at_tail(topology, 3 * f + corner, starts[i])
-            h = half_edge_from(topology.links, g, v)
-            last = angles_at_tail(topology, h, ends[i + 1])
-            right, right_angle = around_vertex(topology, f, corner, g, RIGHT, portals, size)
-            left, left_angle = around_vertex(topology, f, corner, g, LEFT, portals, size)
-            way, end = RIGHT, right
-            right_angle += first[0] + last[1]
-            if left >= 0 and (right < 0 or left_angle + first[1] + last[0] <= right_angle):
-                way, end = LEFT, left
+            portals = with_room(portals, size, 2 * degree)
+            way, row = size, size + degree
+            end = around_vertex(topology.links, f, corner, g, RIGHT, portals, way)
+            left = around_vertex(topology.links, f, corner, g, LEFT, portals, row)
+            if left >= 0:
+                h = half_edge_from(topology.links, g, v)
+                turn = direction_from_tail(topology, h, ends[i + 1])
+                turn -= direction_from_tail(topology, 3 * f + corner, starts[i])
+                around = 0.0 if end < 0 else fan_at(topology, portals[row], LEFT)[1]
+                if 2.0 * (turn if turn >= 0.0 else turn + around) <= around or end < 0:
+                    way, end = row, left
             if end < 0:
                 break
-            around_vertex(topology, f, corner, g, way, portals, size)
-            size = reduced(topology.links, portals, size, end)
+            size = reduced(topology.links, portals, size, way, end)
         elif f != g:
             h = edge_between(topology.links, f, g, starts[i + 1])
             if h < 0:
                 break
             portals = with_room(portals, size, 1)
             portals[size] = h
-            size = reduced(topology.links, portals, size, size + 1)
+            size = reduced(topology.links, portals, size, size, size + 1)
         i += 1
     ends_of = np.empty((2, 3))
     ends_of[0], ends_of[1] = starts[begin], ends[i]
@@ -175,12 +178,11 @@ def half_edge_from(links: Ints, face: int, v: int) -> int:
     return h
 
 
-@kernel
-def angles_at_tail(topology: Topology, h: int, weights: Floats) -> tuple[float, float]:
-    """Angles at the tail of h between it and a point of its face, and from there on, radians."""
+@inlined
+def direction_from_tail(topology: Topology, h: int, weights: Floats) -> float:
+    """Direction from the tail of h to a point of its face, in the tail's unfolded fan, radians."""
     x, y = point_in_frame(topology.geometry, h, weights)
-    angle = math.atan2(y, x)
-    return angle, angle_at(topology.geometry, h, LEFT) - angle
+    return topology.geometry[following(h), APEX_ANGLE] + math.atan2(y, x)
 
 
 @kernel
@@ -215,24 +217,23 @@ def edge_between(links: Ints, f: int, g: int, weights: Floats) -> int:
 
 @kernel
 def around_vertex(
-    topology: Topology, f: int, corner: int, g: int, side: int, portals: Ints, row: int
-) -> tuple[int, float]:
+    links: Ints, f: int, corner: int, g: int, side: int, portals: Ints, row: int
+) -> int:
     """Write the portals from face f around its corner to face g, which have it on a side.
 
-    Return the row after the last, -1 if a hole is in the way, and the angle between, radians.
+    Return the row after the last, -1 if a hole is in the way.
     """
-    h, angle = 3 * f + corner, 0.0
+    h = 3 * f + corner
     if side == RIGHT:  # clockwise: over the half-edge that leaves it
         h = following(following(h))
     while True:
-        h = next_portal(topology.links, h, side)
+        h = next_portal(links, h, side)
         if h < 0 or h // 3 == f:
-            return -1, angle
+            return -1
         portals[row] = h
         row += 1
         if h // 3 == g:
-            return row, angle
-        angle += angle_at(topology.geometry, h, side)
+            return row
 
 
 @inlined
@@ -250,12 +251,12 @@ def angle_at(geometry: Floats, h: int, side: int) -> float:
 
 
 @kernel
-def reduced(links: Ints, portals: Ints, size: int, end: int) -> int:
-    """Append portals from row ``size`` to ``end`` to those before; return how many are left.
+def reduced(links: Ints, portals: Ints, size: int, begin: int, end: int) -> int:
+    """Append portals from row ``begin`` to ``end`` to the first ``size``; return how many are left.
 
     What leads over an edge and back at once is left out. Modifies ``portals``.
     """
-    for i in range(size, end):
+    for i in range(begin, end):
         h = portals[i]
         if size > 0 and links[portals[size - 1], OPPOSITE] == h:
             size -= 1
@@ -441,9 +442,9 @@ def around_bends(
         # A run that another one has changed has its turn in the next pass
         if first < copied or count == 0:
             continue
-        if run < count and around - angle_in_strip(topology, strip, string, k) >= (
-            math.pi - straight
-        ):
+        if run < count and around - angle_in_strip(
+            topology, strip, string, k, first, last, around
+        ) >= (math.pi - straight):
             continue
         end = size + first - copied
         other[size:end] = portals[copied:first]
@@ -457,12 +458,12 @@ def around_bends(
         else:  # once around the vertex, and more
             other[end : end + run - count] = portals[first : first + run - count]
             end += run - count
-        size, copied = reduced(links, other, size, end), last + 1
+        size, copied = reduced(links, other, size, size, end), last + 1
     if copied == 0:
         return False, portals
     end = size + len(portals) - copied
     other[size:end] = portals[copied:]
-    return True, other[: reduced(links, other, size, end)]
+    return True, other[: reduced(links, other, size, size, end)]
 
 
 @kernel
@@ -501,11 +502,13 @@ def is_between(
     ax: float, ay: float, bx: float, by: float, x: float, y: float, straight: float
 ) -> bool:
     """Whether a point is on the line from a to b, seen from both but for an angle."""
-    to_a, to_b = math.hypot(x - ax, y - ay), math.hypot(x - bx, y - by)
-    off = abs(area(ax, ay, bx, by, x, y))
-    is_inside = (x - ax) * (bx - ax) + (y - ay) * (by - ay) > 0.0
-    is_inside = is_inside and (x - bx) * (ax - bx) + (y - by) * (ay - by) > 0.0
-    return is_inside and off <= straight * math.hypot(bx - ax, by - ay) * min(to_a, to_b)
+    if (x - ax) * (bx - ax) + (y - ay) * (by - ay) <= 0.0:
+        return False
+    if (x - bx) * (ax - bx) + (y - by) * (ay - by) <= 0.0:
+        return False
+    nearer = min((x - ax) ** 2 + (y - ay) ** 2, (x - bx) ** 2 + (y - by) ** 2)
+    whole = (bx - ax) ** 2 + (by - ay) ** 2
+    return abs(area(ax, ay, bx, by, x, y)) <= straight * math.sqrt(whole) * math.sqrt(nearer)
 
 
 @kernel
@@ -520,12 +523,15 @@ def run_at(links: Ints, portals: Ints, i: int, side: int) -> tuple[int, int]:
     return first, last
 
 
-@kernel
+@inlined
 def fan_at(topology: Topology, portal: int, side: int) -> tuple[int, float]:
     """Return the number of faces all around the end of a portal on a side, and their angle.
 
     None, where a hole is among them.
     """
+    v = topology.links[portal, TAIL if side == LEFT else HEAD]
+    if not topology.flags[v] & (BOUNDARY | FANS):
+        return topology.first_corner[v + 1] - topology.first_corner[v], topology.total_angle[v]
     h, count, angle = portal, 0, 0.0
     while True:
         angle += angle_at(topology.geometry, h, side)
@@ -538,12 +544,17 @@ def fan_at(topology: Topology, portal: int, side: int) -> tuple[int, float]:
 
 
 @kernel
-def angle_in_strip(topology: Topology, strip: Strip, string: String, k: int) -> float:
-    """Angle at bend k between the parts of the string before and after it, through the strip."""
+def angle_in_strip(
+    topology: Topology, strip: Strip, string: String, k: int, first: int, last: int, around: float
+) -> float:
+    """Angle at bend k between the parts of the string before and after it, through the strip.
+
+    The portals from ``first`` to ``last`` share the vertex there, with less than the angle
+    ``around`` it between them.
+    """
     ends, bends, sides = string.ends, string.bends, string.sides
     side, portals = sides[k], strip.portals
     here, there = (0, 2) if side == LEFT else (2, 0)
-    first, last = run_at(topology.links, portals, bends[k], side)
     bx, by = ends[first, here], ends[first, here + 1]
     px, py, after, column = 0.0, 0.0, len(portals), 0
     if k > 0:
@@ -553,10 +564,19 @@ def angle_in_strip(topology: Topology, strip: Strip, string: String, k: int) -> 
         after, column = bends[k + 1], 0 if sides[k + 1] == LEFT else 2
     ax, ay = ends[first, there] - bx, ends[first, there + 1] - by
     angle = angle_between(px - bx, py - by, ax, ay)
-    for i in range(first, last):
-        angle += angle_at(topology.geometry, portals[i], side)
+    turn = direction_of(topology, portals[last], side)
+    turn -= direction_of(topology, portals[first], side)
+    turn = turn if side == LEFT else -turn
+    angle += turn if turn >= 0.0 else turn + around
     ax, ay = ends[last, there] - bx, ends[last, there + 1] - by
     return angle + angle_between(ax, ay, ends[after, column] - bx, ends[after, column + 1] - by)
+
+
+@inlined
+def direction_of(topology: Topology, portal: int, side: int) -> float:
+    """Direction of a portal in the unfolded fan of its end on a side, radians."""
+    h = portal if side == LEFT else topology.links[portal, OPPOSITE]
+    return topology.geometry[following(h), APEX_ANGLE]
 
 
 @kernel

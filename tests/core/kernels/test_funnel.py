@@ -133,7 +133,7 @@ def strip_beside(mesh, side):
     first, last = (next(f for f in (2, 3, 0, 1) if holds(mesh, f, u)) for u in (0, 2))
     portals = np.empty(4, np.int32)
     corners = mesh.topology.links[3 * first : 3 * first + 3, TAIL].tolist()
-    count, _ = around_vertex(mesh.topology, first, corners.index(v), last, side, portals, 0)
+    count = around_vertex(mesh.topology.links, first, corners.index(v), last, side, portals, 0)
     weights = np.array([weights_of(mesh, first, 0), weights_of(mesh, last, 2)])
     return Strip(portals[:count], np.array([first, last]), weights), v
 
