@@ -21,7 +21,7 @@ from geodesic_core.kernels.front.counters import (
 )
 from geodesic_core.kernels.front.pool import put_window
 from geodesic_core.kernels.front.state import WIDTH, View
-from geodesic_core.kernels.front.window import BUCKET, HALF_EDGE, INTS, NEXT, WON, Window
+from geodesic_core.kernels.front.window import HALF_EDGE, INTS, KEY, NEXT, WON, Window
 from geodesic_core.kernels.jit import as_ints, inlined, kernel, prefetch
 from geodesic_core.kernels.mesh.half_edges import ROW
 from geodesic_core.tolerances import LAST_BUCKET
@@ -38,15 +38,16 @@ def push(wave: View, h: int, window: Window, won: int, key: float) -> None:
     if h >= 0:  # it comes up long after: to wait for memory then took a third of the sweep
         prefetch(wave.mesh.links, ROW * h)
         prefetch(wave.mesh.geometry, ROW * h)
-    due = math.floor(min(key * wave.places.buckets_per_unit, LAST_BUCKET))
-    rows[WIDTH * slot + BUCKET] = due
-    enqueue(wave, slot, max(int(due), counters[CURRENT]))
+    rows[WIDTH * slot + KEY] = key
+    enqueue(wave, slot, key)
 
 
 @inlined
-def enqueue(wave: View, slot: int, bucket: int) -> None:
-    """Put a window into a bucket of the ring, or into the chain of those beyond it."""
+def enqueue(wave: View, slot: int, key: float) -> None:
+    """Put a window into its bucket of the ring, or into the chain of those beyond it."""
     counters = wave.counters
+    due = math.floor(min(key * wave.places.buckets_per_unit, LAST_BUCKET))
+    bucket = max(int(due), counters[CURRENT])
     if bucket < counters[CURRENT] + BUCKETS:
         append(wave, slot, bucket)
         return
@@ -96,7 +97,7 @@ def take_in_far(wave: View) -> None:
     counters[FAR_FIRST] = -1
     while slot >= 0:
         after = int(as_ints(rows)[INTS * slot + NEXT])
-        enqueue(wave, slot, max(int(rows[WIDTH * slot + BUCKET]), counters[CURRENT]))
+        enqueue(wave, slot, rows[WIDTH * slot + KEY])
         slot = after
 
 

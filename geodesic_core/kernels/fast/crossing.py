@@ -9,12 +9,20 @@ paths that exist: the best of them wins a place, or several, and the rest is dro
 import math
 from typing import NamedTuple
 
-from geodesic_core.kernels.fast.places import AT_LARGE, distance_along, offer_end, offer_over, relax
+from geodesic_core.kernels.fast.places import (
+    AT_LARGE,
+    Offers,
+    distance_along,
+    offer_all,
+    offer_all_around,
+    relax,
+)
 from geodesic_core.kernels.front.counters import PROPAGATED
 from geodesic_core.kernels.front.sides import Side, left_of, right_of
-from geodesic_core.kernels.front.state import NEXT_SITE, NODE, SITE, View
+from geodesic_core.kernels.front.state import NEXT_SITE, NODE, SITE, WIDTH, View
 from geodesic_core.kernels.front.window import (
     INTS,
+    KEY,
     WON,
     Window,
     distance_at,
@@ -58,11 +66,13 @@ class Corners(NamedTuple):
 
 
 @inlined
-def is_live(wave: View, h: int, window: Window, won: int) -> bool:
-    """Whether a window is still the nearest at a place that it won."""
+def is_live(wave: View, h: int, window: Window, won: int, key: float) -> bool:
+    """Whether a window of this key is still the nearest at a place that it won."""
     if won & AT_LARGE:
         return True
     values, places = wave.places.values, wave.places.per_edge
+    if places == 1:
+        return values[h] == key
     step = wave.mesh.geometry[ROW * h + LENGTH] / places
     for k in range(places):
         if won >> k & 1:
@@ -88,7 +98,7 @@ def cross(wave: View, h: int, slot: int) -> None:
     """Send the window of a row, if it is live, over the face of h. Modifies the wavefront."""
     mesh, rows, distance = wave.mesh, wave.pool.windows, wave.vertices.distance
     window = load_window(wave, rows, slot)
-    if not is_live(wave, h, window, as_ints(rows)[INTS * slot + WON]):
+    if not is_live(wave, h, window, as_ints(rows)[INTS * slot + WON], rows[WIDTH * slot + KEY]):
         return
     wave.counters[PROPAGATED] += 1
     left, right = left_of(wave, h), right_of(wave, h)
@@ -163,27 +173,32 @@ def send_over(
     u1 = side.length
     if x > window.b1:
         u1 = hit_left(window.b1, window.sy, depth, side.sine, side.length, window.weight)
-    if u1 > u0:
-        offer_side(wave, side, g, seen_over(window, u0, u1, along, depth))
-    near, apex, far = corners
+    sx, sy, sigma = length * side.cosine, -length * side.sine, wave.vertices.distance[corners.far]
+    far = emitted_window(wave, 0.0, side.length, sx, sy, sigma, corners.far, 0.0)
+    offers = Offers(
+        seen=as_seen_across(side, seen_over(window, u0, u1, along, depth)),
+        is_lit=u1 > u0,
+        near=end_of(wave, side, 0.0, corners.near),
+        apex=end_of(wave, side, side.length, corners.apex),
+        far=as_seen_across(side, far),
+        is_bent=x > window.b1 and window.b1 == length,
+    )
     if side.out >= 0:
-        offer_end(wave, side.out, g, side.length, near, not side.is_right)
-        offer_end(wave, side.out, g, side.length, apex, side.is_right)
+        offer_all(wave, side.out, g, side.length, offers)
     else:
-        ends = wave.vertices.distance[near], wave.vertices.distance[apex]
-        offer_side(
-            wave, side, g, emitted_window(wave, 0.0, side.length, 0.0, 0.0, ends[0], near, 0.0)
-        )
-        place = side.length
-        offer_side(wave, side, g, emitted_window(wave, 0.0, place, place, 0.0, ends[1], apex, 0.0))
-    if x > window.b1 and window.b1 == length:
-        sx, sy, sigma = length * side.cosine, -length * side.sine, wave.vertices.distance[far]
-        offer_side(wave, side, g, emitted_window(wave, 0.0, side.length, sx, sy, sigma, far, 0.0))
+        offer_all_around(wave, g, offers)
 
 
 @inlined
-def offer_side(wave: View, side: Side, g: int, window: Window) -> None:
-    """Offer a window, as seen from the end of the side g at which that begins, across it."""
-    if side.is_right:  # the half-edge across begins at the apex
-        window = reversed_window(window, side.length)
-    offer_over(wave, side.out, g, side.length, window)
+def end_of(wave: View, side: Side, place: float, v: int) -> Window:
+    """Return the window of an end of a side, a pseudosource, as seen across it."""
+    sigma = wave.vertices.distance[v]
+    return as_seen_across(side, emitted_window(wave, 0.0, side.length, place, 0.0, sigma, v, 0.0))
+
+
+@inlined
+def as_seen_across(side: Side, window: Window) -> Window:
+    """Return a window, as seen from where a side begins, in the frame of the half-edge across."""
+    if side.is_right:  # it begins at the apex
+        return reversed_window(window, side.length)
+    return window

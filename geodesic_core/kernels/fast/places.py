@@ -1,6 +1,7 @@
 """Windows offered to a half-edge, and nodes offered a distance: what is nearer goes on."""
 
 import math
+from typing import NamedTuple
 
 from geodesic_core.kernels.fast.buckets import push
 from geodesic_core.kernels.front.counters import TOUCHED
@@ -46,12 +47,77 @@ def least_known(wave: View, h: int, twin: int, k: int) -> float:
     return float(least)
 
 
+class Bid(NamedTuple):
+    """What a window has won of a half-edge."""
+
+    won: int
+    """As in WON; 0 for nothing"""
+    key: float
+    """Its least distance there, mesh units"""
+
+
+NO_BID = Bid(0, math.inf)
+
+
+class Offers(NamedTuple):
+    """The windows that leave a face over a side, in the frame of the half-edge across."""
+
+    seen: Window
+    """What the window that crosses the face lights"""
+    is_lit: bool
+    """Whether it lights anything"""
+    near: Window
+    """The end of the side where the half-edge that was crossed is, as a pseudosource"""
+    apex: Window
+    """The other end of the side"""
+    far: Window
+    """The other end of the half-edge that was crossed"""
+    is_bent: bool
+    """Whether the window's ray to the apex passes by that end"""
+
+
+@inlined
+def offer_all(wave: View, h: int, twin: int, length: float, offers: Offers) -> None:
+    """Offer windows to h; those wait that hold a place once all have been offered.
+
+    Arguments and effects as in `offer`.
+    """
+    seen, is_lit, near, apex, far, is_bent = offers
+    by_window = bid(wave, h, twin, length, seen) if is_lit else NO_BID
+    by_near = bid_of_end(wave, h, twin, length, near)
+    by_apex = bid_of_end(wave, h, twin, length, apex)
+    by_far = bid(wave, h, twin, length, far) if is_bent else NO_BID
+    lost_to_far = by_far.won
+    lost_to_apex = lost_to_far | by_apex.won
+    wait(wave, h, length, seen, by_window, lost_to_apex | by_near.won)
+    wait(wave, h, length, near, by_near, lost_to_apex)
+    wait(wave, h, length, apex, by_apex, lost_to_far)
+    wait(wave, h, length, far, by_far, 0)
+
+
 @kernel
 def offer(wave: View, h: int, twin: int, length: float, window: Window) -> None:
     """Offer a window to h, of this length; it waits if it is the nearest at any place.
 
     ``twin`` as in `least_known`. Modifies values, pool and buckets.
     """
+    wait(wave, h, length, window, bid(wave, h, twin, length, window), 0)
+
+
+@inlined
+def wait(wave: View, h: int, length: float, window: Window, made: Bid, lost: int) -> None:
+    """Have a window wait to cross h, if it has not ``lost`` all that its bid had won.
+
+    Modifies pool and buckets.
+    """
+    won = made.won & (AT_LARGE | ~lost)
+    if won and may_go_on(wave, h, length, made.key):
+        push(wave, h, window, won, made.key)
+
+
+@inlined
+def bid(wave: View, h: int, twin: int, length: float, window: Window) -> Bid:
+    """Offer a window to the places of h, as `offer` does; return what it wins. Modifies values."""
     won, key = 0, math.inf
     step = length / wave.places.per_edge
     for k in range(wave.places.per_edge):
@@ -63,8 +129,7 @@ def offer(wave: View, h: int, twin: int, length: float, window: Window) -> None:
     if won == 0 and is_far_nearer(wave, h, length, window):
         won, key = AT_LARGE, distance_at(window, 0.5 * (window.b0 + window.b1))
         wave.places.at_large[h] += 1
-    if won and may_go_on(wave, h, length, key):
-        push(wave, h, window, won, key)
+    return Bid(won, key)
 
 
 @inlined
@@ -100,19 +165,17 @@ def is_far_nearer(wave: View, h: int, length: float, window: Window) -> bool:
 
 
 @inlined
-def offer_end(wave: View, h: int, twin: int, length: float, root: int, is_tail: bool) -> None:
-    """Offer h its own tail, or its head, as a pseudosource; as `offer` does."""
-    sigma, end = wave.vertices.distance[root], 0.0 if is_tail else length
+def bid_of_end(wave: View, h: int, twin: int, length: float, window: Window) -> Bid:
+    """Offer the places of h the window of one of its ends, as `bid` does."""
     won, key = 0, math.inf
     step = length / wave.places.per_edge
     for k in range(wave.places.per_edge):
-        distance = sigma + abs(step * (k + 0.5) - end)
+        distance = window.sigma + abs(step * (k + 0.5) - window.sx)
         if distance < least_known(wave, h, twin, k):
             wave.places.values[wave.places.per_edge * h + k] = distance
             won |= 1 << k
             key = min(key, distance)
-    if won and may_go_on(wave, h, length, key):
-        push(wave, h, emitted_window(wave, 0.0, length, end, 0.0, sigma, root, 0.0), won, key)
+    return Bid(won, key)
 
 
 @kernel
@@ -130,6 +193,17 @@ def offer_around(wave: View, g: int, window: Window) -> None:
             seen = reversed_window(window, length)
         offer(wave, h, -1, length, seen)
         h = int(mesh.links[ROW * h + AROUND] >> 1)
+
+
+@inlined
+def offer_all_around(wave: View, g: int, offers: Offers) -> None:
+    """Offer windows that leave a face by its half-edge g to the others, as `offer_around` does."""
+    if offers.is_lit:
+        offer_around(wave, g, offers.seen)
+    offer_around(wave, g, offers.near)
+    offer_around(wave, g, offers.apex)
+    if offers.is_bent:
+        offer_around(wave, g, offers.far)
 
 
 @inlined

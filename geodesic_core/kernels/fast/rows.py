@@ -34,10 +34,17 @@ def forget(topology: Topology, wavefront: Wavefront) -> None:
     Windows were offered only to half-edges both of whose ends it had reached.
     """
     places, vertices = wavefront.places, wavefront.vertices
-    for i in range(wavefront.counters[TOUCHED]):
+    count = wavefront.counters[TOUCHED]
+    is_whole = 2 * count > len(topology.total_angle)
+    if is_whole:  # in the order of memory
+        places.at_large[:] = 0
+        places.values[:] = math.inf
+    for i in range(count):
         v = vertices.touched[i]
         vertices.distance[v] = math.inf
         vertices.winner_ints[v, ENTRY_EDGE] = vertices.winner_ints[v, PREDECESSOR] = -1
+        if is_whole:
+            continue
         for c in range(topology.first_corner[v], topology.first_corner[v + 1]):
             h = topology.corners[c]
             places.at_large[h] = 0

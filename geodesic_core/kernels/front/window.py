@@ -41,7 +41,7 @@ since the root tells it. What a column holds depends on the kind of sweep:
 column   exact              merging            fast
 =======  =================  =================  ==================================================
 0 to 4   B0 … SIGMA         B0 … SIGMA         B0 … SIGMA
-5        TURN, if directed  XI                 BUCKET: in which it is due, counted from distance 0
+5        TURN, if directed  XI                 KEY: its least distance, by which it is due
 int 12   REFERENCE          REFERENCE          HALF_EDGE: that it is to cross; -1 - v where vertex
                                                v is to emit all around, from SIGMA
 int 13   MIRRORED, if       free               WON: bits of the places at which it was the nearest
@@ -81,7 +81,7 @@ SY = 3
 SIGMA = 4
 TURN = 5
 XI = 5
-BUCKET = 5
+KEY = 5
 
 # Columns of a row, int32
 REFERENCE = 12
