@@ -4,7 +4,9 @@ import os
 import re
 import sys
 from pathlib import Path
+from typing import Any
 
+from docutils import nodes
 from sphinx.application import Sphinx
 
 DOCS = Path(__file__).parent
@@ -20,17 +22,16 @@ project = "Geodesic"
 default_role = "py:obj"  # names in backticks lead to what they name, where it is documented
 html_theme = "furo"
 html_title = "Geodesic"
+html_static_path = ["static", "drawn/static"]
 html_copy_source = False  # the wheel carries the site
 extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
-    "sphinxcontrib.mermaid",
 ]
 exclude_patterns = ["_build"]
 suppress_warnings = ["misc.highlighting_failure"]  # sessions show answers shortened by …
 myst_heading_anchors = 4
-myst_fence_as_directive = ["mermaid"]
 napoleon_google_docstring = False
 napoleon_use_ivar = True
 autodoc_typehints = "none"  # the signature and the docstring have them
@@ -68,8 +69,19 @@ def insert_results(_app: Sphinx, _page: str, text: list[str]) -> None:
     text[0] = with_results(text[0])
 
 
+def add_diagrams(
+    app: Sphinx, _page: str, _template: str, _context: dict[str, Any], tree: nodes.document | None
+) -> None:
+    """Have a page draw its diagrams, by a script that the site carries: it needs no network."""
+    blocks = tree.findall(nodes.literal_block) if tree else ()
+    if any(block.get("language") == "mermaid" for block in blocks):
+        app.add_js_file("mermaid.tiny.js", loading_method="defer")
+        app.add_js_file("diagrams.js", loading_method="defer")
+
+
 def setup(app: Sphinx) -> None:
-    """Have the pictures drawn before the pages are read, figures inserted, and links adapted."""
+    """Connect what is done before pages are read, as they are read, and as they are written."""
     app.connect("builder-inited", draw)
     app.connect("source-read", insert_results)
     app.connect("source-read", leave_out_links_to_the_repository)
+    app.connect("html-page-context", add_diagrams)
