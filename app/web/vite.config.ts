@@ -8,6 +8,7 @@ export default defineConfig({
     target: "es2022",
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
+    license: { fileName: "licences.md" }, // of the packages that it contains
     chunkSizeWarningLimit: 1600, // the reference of the interface; the page itself is half as large
     rolldownOptions: { input: ["index.html", "docs.html"] },
   },

@@ -53,6 +53,17 @@ def test_the_page_was_built_from_the_sources_as_they_are() -> None:
     assert told.stdout.strip() == "True", "scripts/page builds it"
 
 
+@pytest.mark.usefixtures("service")
+def test_the_page_carries_the_licences_of_its_packages() -> None:
+    sources = "".join(path.read_text() for path in (ROOT / "app/web/src").rglob("*.ts"))
+    imported = set(re.findall(r"""(?:from|import)\s*\(?["']([a-z][a-z0-9-]*)""", sources))
+    text = (ROOT / "app/web/dist/licences.md").read_text()
+    told = set(re.findall(r"^## (\S+) - ", text, re.MULTILINE))
+
+    assert {"three", "d3-scale-chromatic"} <= imported
+    assert imported - {"geodesic-client"} <= told
+
+
 def test_all_packages_are_locked_to_their_content() -> None:
     lock = json.loads((ROOT / "app/web/package-lock.json").read_text())
     packages = {name: each for name, each in lock["packages"].items() if name}
