@@ -10,7 +10,6 @@ import numpy as np
 from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument, NoPath
-from geodesic_core.extras import extra
 from geodesic_core.fields.methods import SweepOf
 from geodesic_core.fields.sources import as_points, component_of, ends_of
 from geodesic_core.fields.sweeps import ExactSweep
@@ -126,8 +125,7 @@ class _Sparse:
     """A matrix of the finite distances in the making."""
 
     def __init__(self, plan: Plan) -> None:
-        with extra("sparse", "SciPy", 'distance_matrix(layout="sparse")'):
-            from scipy.sparse import coo_array
+        from scipy.sparse import coo_array
 
         self._from_triples = coo_array
         self._plan = plan
