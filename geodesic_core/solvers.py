@@ -473,8 +473,6 @@ def distance_matrix(
     ------
     InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As in `exact_distance`.
-    MissingExtra
-        The layout is sparse, and SciPy is not installed; the extra ``sparse`` brings it.
 
     Notes
     -----

@@ -63,8 +63,6 @@ def smooth(
         There are not as many values as vertices.
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As in `distance_matrix`.
-    MissingExtra
-        It needs SciPy, the extra ``sparse``.
 
     Notes
     -----

@@ -143,19 +143,20 @@ def strip_along(
             v = topology.links[3 * f + corner, TAIL]
             degree = topology.first_corner[v + 1] - topology.first_corner[v]
             portals = with_room(portals, size, 2 * degree)
-            way, row = size, size + degree
-            end = around_vertex(topology.links, f, corner, g, RIGHT, portals, way)
-            left = around_vertex(topology.links, f, corner, g, LEFT, portals, row)
-            if left >= 0:
+            first, end = size, around_vertex(topology.links, f, corner, g, RIGHT, portals, size)
+            left = around_vertex(topology.links, f, corner, g, LEFT, portals, size + degree)
+            is_left = end < 0
+            if end >= 0 and left >= 0:  # the way with the lesser angle
                 h = half_edge_from(topology.links, g, v)
-                turn = direction_from_tail(topology, h, ends[i + 1])
-                turn -= direction_from_tail(topology, 3 * f + corner, starts[i])
-                around = 0.0 if end < 0 else fan_at(topology, portals[row], LEFT)[1]
-                if 2.0 * (turn if turn >= 0.0 else turn + around) <= around or end < 0:
-                    way, end = row, left
+                start = direction_from_tail(topology, 3 * f + corner, starts[i])
+                _, around = fan_at(topology, portals[size + degree], LEFT)
+                angle = turned(start, direction_from_tail(topology, h, ends[i + 1]), around)
+                is_left = 2.0 * angle <= around
+            if is_left:
+                first, end = size + degree, left
             if end < 0:
                 break
-            size = reduced(topology.links, portals, size, way, end)
+            size = reduced(topology.links, portals, size, first, end)
         elif f != g:
             h = edge_between(topology.links, f, g, starts[i + 1])
             if h < 0:
@@ -213,6 +214,13 @@ def edge_between(links: Ints, f: int, g: int, weights: Floats) -> int:
         if across >= 0 and across // 3 == f and (found < 0 or up < weights[(found + 2) % 3]):
             found = h
     return found
+
+
+@inlined
+def turned(start: float, end: float, around: float) -> float:
+    """Angle counter-clockwise between two directions in a closed fan, of the angle ``around``."""
+    angle = end - start
+    return angle if angle >= 0.0 else angle + around
 
 
 @kernel
@@ -549,8 +557,8 @@ def angle_in_strip(
 ) -> float:
     """Angle at bend k between the parts of the string before and after it, through the strip.
 
-    The portals from ``first`` to ``last`` share the vertex there, with less than the angle
-    ``around`` it between them.
+    The portals from ``first`` to ``last`` share the vertex there; ``around`` is the angle of its
+    fan, which they do not go all around.
     """
     ends, bends, sides = string.ends, string.bends, string.sides
     side, portals = sides[k], strip.portals
@@ -564,10 +572,9 @@ def angle_in_strip(
         after, column = bends[k + 1], 0 if sides[k + 1] == LEFT else 2
     ax, ay = ends[first, there] - bx, ends[first, there + 1] - by
     angle = angle_between(px - bx, py - by, ax, ay)
-    turn = direction_of(topology, portals[last], side)
-    turn -= direction_of(topology, portals[first], side)
-    turn = turn if side == LEFT else -turn
-    angle += turn if turn >= 0.0 else turn + around
+    start = direction_of(topology, portals[first], side)
+    end = direction_of(topology, portals[last], side)
+    angle += turned(start, end, around) if side == LEFT else turned(end, start, around)
     ax, ay = ends[last, there] - bx, ends[last, there + 1] - by
     return angle + angle_between(ax, ay, ends[after, column] - bx, ends[after, column + 1] - by)
 
