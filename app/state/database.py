@@ -1,5 +1,6 @@
 """The database of a service: SQLite in a file of its store, or PostgreSQL that several share."""
 
+import sqlite3
 from collections.abc import AsyncIterator, Iterator, Sequence
 from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
@@ -75,7 +76,13 @@ class Database:
             )
         # With one connection, transactions come one after the other.
         url = _file_url("sqlite+aiosqlite", self._path, "rwc")
-        engine = create_async_engine(url, pool_size=1, max_overflow=0, pool_reset_on_return=None)
+        engine = create_async_engine(
+            url,
+            connect_args={"factory": _SelfClosing},
+            pool_size=1,
+            max_overflow=0,
+            pool_reset_on_return=None,
+        )
         event.listen(engine.sync_engine, "connect", _configure)
         return engine
 
@@ -150,6 +157,16 @@ class Database:
                 if self.is_shared and lock is not None:
                     await connection.execute(_alone(lock))
                 yield connection
+
+
+class _SelfClosing(sqlite3.Connection):
+    """Closes itself where nothing refers to it any more.
+
+    Where a request is cancelled while its connection opens, aiosqlite forgets what it opened.
+    """
+
+    def __del__(self) -> None:
+        self.close()
 
 
 def require_intact(path: Path) -> None:

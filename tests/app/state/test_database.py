@@ -17,10 +17,9 @@ from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, insert, select, text
 
 from app.jobs import JobRepository, read_jobs
-from app.state import Database, StateError
+from app.state import Database, StateError, migrations
 from app.state.schema import HEAD, metadata, queries
 from tests.support.jobs import new_job
-from tests.support.paths import ROOT
 
 pytestmark = pytest.mark.anyio
 
@@ -106,7 +105,8 @@ async def test_revisions_lead_to_the_tables_of_the_schema(
     Database(tmp_path / "jobs.sqlite3", state_url).prepare()
     async with database.transaction() as connection:
         assert await connection.run_sync(differences) == []
-    assert ScriptDirectory(str(ROOT / "app/state/migrations")).get_current_head() == HEAD
+    scripts = ScriptDirectory(str(Path(migrations.__file__).parent))
+    assert scripts.get_current_head() == HEAD
 
 
 async def test_the_tables_of_a_newer_release_are_refused(
