@@ -69,7 +69,7 @@ def writable(*suffixes: str, to_stdout: bool = True) -> Callable[[Path | None], 
     def check(path: Path | None) -> Path | None:
         if path is None or (path == STANDARD_STREAM and to_stdout):
             return path
-        if path.suffix.lower() not in suffixes:
+        if not path.name.lower().endswith(suffixes):
             *others, last = suffixes
             ends = f"{', '.join(others)} or {last}" if others else last
             raise typer.BadParameter(f"{path} must end in {ends}")

@@ -63,7 +63,10 @@ CorrectedAreas = Annotated[
         help="Areas of vertices to measure by, for an average surface: files as for --roi."
     ),
 ]
-_MORPHOMETRY = (".curv", ".sulc", ".thickness", ".area", ".volume")
+_OF_MAPS = (
+    *(".dscalar.nii", ".func.gii", ".shape.gii"),
+    *(".curv", ".sulc", ".thickness", ".area", ".volume"),
+)
 _OF_MATRICES = (".dconn.nii", ".npz", ".zarr", ".parquet", ".npy")
 
 
@@ -75,7 +78,7 @@ def distances(
         typer.Option(
             help="Where they go: .dconn.nii, .npy or .zarr; .npz or .parquet for the finite "
             "distances only.",
-            callback=writable(".nii", *_OF_MATRICES[1:], to_stdout=False),
+            callback=writable(*_OF_MATRICES, to_stdout=False),
         ),
     ],
     roi: Roi = None,
@@ -188,7 +191,7 @@ def smooth(
         typer.Option(
             help="Where they go: .dscalar.nii; for one hemisphere also .func.gii or .shape.gii, "
             "and for one map FreeSurfer's .curv, .sulc, .thickness, .area or .volume.",
-            callback=writable(".nii", ".gii", *_MORPHOMETRY, to_stdout=False),
+            callback=writable(*_OF_MAPS, to_stdout=False),
         ),
     ],
     roi: Roi = None,

@@ -16,6 +16,7 @@ import typer
 from app.cli.arguments import (
     NO_MERGE,
     SPELLINGS,
+    STANDARD_STREAM,
     AbsoluteError,
     Barriers,
     BoundedMethodOption,
@@ -38,6 +39,7 @@ from app.cli.arguments import (
 )
 from app.cli.ask import Answered, ask
 from app.cli.barriers import BlockedFaces
+from app.cli.files import writing
 from app.cli.output import AsJson, Output
 from app.cli.points import Curves, Direction, Point, Position
 from app.cli.steps import Failure, MeshInput
@@ -46,6 +48,7 @@ from app.cli.values_file import Values
 
 if TYPE_CHECKING:
     from app.encoding import Answer
+    from geodesic_core.arrays import Floats
 
 Given = Mapping[str, Any]
 """The options of a command, by name"""
@@ -187,6 +190,16 @@ def _with_columns(answer: "Answer", out: Path | None) -> "Answer | None":
 
     columns = np.column_stack([answer.members["distances"], answer.members["gradient"]])
     return Answer({"array": columns}, ("array",))
+
+
+def _write_metric(path: Path, surface: Path, distances: "Floats") -> None:
+    """Write the distances of a hemisphere, whose side the file of its surface tells."""
+    from geodesic_core.brain import load_cortex, write_maps
+
+    if surface == STANDARD_STREAM:
+        raise Failure(f"{path} tells its hemisphere, and standard input does not: give a file")
+    with writing(path):
+        write_maps(path, load_cortex(surface), distances, ["distance"])
 
 
 # Paths
@@ -389,8 +402,9 @@ COMMANDS = {
         {
             "source": (PointOrLabelSources, _NEEDED),
             **_out(
-                "distances go: .npy, .csv, .json or .ply (the mesh, coloured); - prints .csv.",
-                *(".npy", ".csv", ".json", ".ply"),
+                "distances go: .npy, .csv, .json, .ply (the mesh, coloured), or .func.gii of a "
+                "hemisphere; - prints .csv.",
+                *(".npy", ".csv", ".json", ".ply", ".func.gii"),
             ),
             "gradient": (
                 Annotated[
@@ -853,7 +867,11 @@ def _run(command: Command, given: dict[str, Any]) -> None:
     found = answered.answer.members
     if found.get("status") == "no_path":
         raise Failure(_NO_PATH[found["reason"]].format(limit=given["max_distance"]))
-    output.write(answered.answer, in_file=_with_columns(answered.answer, output.out))
+    if output.out is not None and output.out.suffix.lower() == ".gii":
+        _write_metric(output.out, mesh.file, found["distances"])
+        Output(None, output.as_json).write(answered.answer)
+    else:
+        output.write(answered.answer, in_file=_with_columns(answered.answer, output.out))
     _summarize(output, command, given, answered)
 
 

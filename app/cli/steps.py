@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from app.store.meshes import OpenMesh
 
 
+_LOG_INTERVAL_S = 60.0
+"""Between lines about a step whose standard error is no terminal"""
+
+
 class Failure(Exception):  # noqa: N818 - not an error of this program
     """A failure that the user can do something about, told in one line."""
 
@@ -69,7 +73,7 @@ class Step(NamedTuple):
 
 @contextmanager
 def showing(label: str) -> Iterator[Step]:
-    """Show a bar on standard error, where that is a terminal, until the step is over.
+    """Show a bar on standard error until the step is over; in a log, a line each minute.
 
     Ctrl-C ends the step at its next checkpoint: a KeyboardInterrupt raised during an import or in
     compiled code gets lost, or becomes a SystemError. The second Ctrl-C works as usual.
@@ -86,13 +90,19 @@ def showing(label: str) -> Iterator[Step]:
 
     usual = signal.signal(signal.SIGINT, note)
     console = Console(stderr=True)
+    told = perf_counter()
+
+    def show(share: float) -> None:
+        nonlocal told
+        progress.update(task, total=1.0, completed=share)
+        if progress.disable and perf_counter() - told >= _LOG_INTERVAL_S:
+            told = perf_counter()
+            typer.echo(f"{label}: {share:.0%}", err=True)
+
     try:
         with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
             task = progress.add_task(label, total=None)
-            yield Step(
-                progress=lambda share: progress.update(task, total=1.0, completed=share),
-                cancel=lambda: pressed,
-            )
+            yield Step(progress=show, cancel=lambda: pressed)
     except Exception:
         if not pressed:
             raise  # else the step failed because it was cancelled

@@ -185,7 +185,8 @@ class IsolinesQuery(FromSources[IsolinesRequest]):
             field = gc.ScalarField(opened.mesh, np.array(self.request.values, np.float64))
         levels = self.request.levels
         if levels is None:
-            levels = _levels_between(field.values, self._level_count)
+            with naming((gc.errors.InvalidArgument, "/count")):
+                levels = field.levels(self._level_count).tolist()
         about = {
             "method": "exact",
             "error_bound": CERTAIN,
@@ -231,13 +232,3 @@ def _refuse_levels_below_0(request: IsolinesRequest) -> None:
     wrong = [pointer("levels", i) for i, level in levels if level <= 0.0]
     if wrong:
         raise invalid_fields(wrong[:FAULTS_SHOWN], "a distance must be greater than 0")
-
-
-def _levels_between(values: NDArray[np.float64], count: int) -> list[float]:
-    """Return levels evenly spaced between the lowest and the highest value, both left out."""
-    present = values[np.isfinite(values)]
-    if not len(present) or present.min() == present.max():
-        raise invalid_fields(["/count"], "no two values differ, so that no level lies between")
-    shares = np.arange(1, count + 1) / (count + 1)
-    levels: list[float] = (present.min() * (1.0 - shares) + present.max() * shares).tolist()
-    return levels

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Coroutine
 from functools import wraps
-from inspect import signature
+from inspect import Parameter, signature
 from typing import Any, Generic, ParamSpec, Protocol, TypeVar, get_args, overload
 
 from geodesic_client.flow import Flow
@@ -54,5 +54,7 @@ class Method(Generic[P, T]):
                 raise TypeError(f"{self._begin.__name__} is called on a client, not on its class")
             return run(self._begin(*args, **kwargs))
 
-        call.__signature__ = self._signature  # type: ignore[attr-defined]
+        own = Parameter("self", Parameter.POSITIONAL_ONLY)
+        parameters = [*([own] if instance is None else ()), *self._signature.parameters.values()]
+        call.__signature__ = self._signature.replace(parameters=parameters)  # type: ignore[attr-defined]
         return call

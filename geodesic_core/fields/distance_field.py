@@ -25,6 +25,7 @@ from geodesic_core.fields.gradient import gradient_at_vertices
 from geodesic_core.fields.isolines import (
     Drawing,
     as_levels,
+    drawn_levels,
     resolve_chord_error,
     spaced_levels,
 )
@@ -266,10 +267,7 @@ class DistanceField:
         """
         with plotting.picture(save, camera, title, "DistanceField.plot") as plotter:
             plotting.draw_surface(plotter, self.to_pyvista())
-            if isinstance(isolines, int):
-                levels: Sequence[float] = self.levels(isolines).tolist() if isolines else []
-            else:
-                levels = isolines
+            levels = drawn_levels(isolines, self.levels)
             lines = chain.from_iterable(self.isolines(levels) if len(levels) else [])
             shown = [line.to_pyvista() for line in lines]
             plotting.draw_lines(plotter, shown, plotting.ISOLINE, plotting.ISOLINE_WIDTH)

@@ -1,7 +1,7 @@
 """Isolines: lines of equal distance on the surface."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -53,8 +53,7 @@ def spaced_levels(distances: Floats, count: int) -> Floats:
     >>> gc.spaced_levels(np.array([0.0, 1.0, 4.0, np.inf]), 3).tolist()
     [1.0, 2.0, 3.0]
     """
-    if not is_index(count) or count < 1:
-        raise InvalidArgument(f"the count of levels is {count!r}; it must be an integer, 1 or more")
+    check_level_count(count)
     largest = distances.max(where=np.isfinite(distances), initial=0.0)
     if largest == 0.0:
         raise InvalidArgument(
@@ -62,6 +61,21 @@ def spaced_levels(distances: Floats, count: int) -> Floats:
         )
     spaced: Floats = np.arange(1, count + 1) * (largest / (count + 1))
     return spaced
+
+
+def check_level_count(count: int) -> None:
+    """Raise ``InvalidArgument`` where a number of levels is no integer, 1 or more."""
+    if not is_index(count) or count < 1:
+        raise InvalidArgument(f"the count of levels is {count!r}; it must be an integer, 1 or more")
+
+
+def drawn_levels(
+    isolines: int | Sequence[float], spaced: Callable[[int], Floats]
+) -> Sequence[float]:
+    """Return the levels of a picture, given as such or as their number; 0 for none."""
+    if not isinstance(isolines, int):
+        return isolines
+    return spaced(isolines).tolist() if isolines else []
 
 
 def as_levels(levels: Sequence[float]) -> list[float]:

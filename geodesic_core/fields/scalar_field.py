@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from geodesic_core import plotting
 from geodesic_core.arrays import Floats
 from geodesic_core.errors import InvalidArgument
+from geodesic_core.fields.isolines import check_level_count, drawn_levels
 from geodesic_core.kernels.curves.chains import link_crossing_chains
 from geodesic_core.kernels.curves.level_sets import chain_level_set
 from geodesic_core.mesh.canonical import as_given, each_of
@@ -68,6 +69,38 @@ class ScalarField:
         own.flags.writeable = False
         object.__setattr__(self, "mesh", mesh)
         object.__setattr__(self, "values", own)
+
+    def levels(self, count: int) -> Floats:
+        """Return levels for `isolines`, evenly spaced between the lowest and the highest value.
+
+        Parameters
+        ----------
+        count
+            Number of levels, 1 or more.
+
+        Returns
+        -------
+        numpy.ndarray
+            (count,) float64, ascending; the lowest and the highest value are left out.
+
+        Raises
+        ------
+        InvalidArgument
+            The count is not an integer of 1 or more, or no two values differ.
+
+        Examples
+        --------
+        >>> mesh = gc.samples.plane(2)
+        >>> gc.ScalarField(mesh, mesh.vertices[:, 0]).levels(3).tolist()
+        [0.25, 0.5, 0.75]
+        """
+        check_level_count(count)
+        present = self.values[np.isfinite(self.values)]
+        if not len(present) or present.min() == present.max():
+            raise InvalidArgument("no two values differ, so that no level lies between")
+        shares = np.arange(1, count + 1) / (count + 1)
+        levels: Floats = present.min() * (1.0 - shares) + present.max() * shares
+        return levels
 
     def isolines(self, levels: Sequence[float]) -> list[list[SurfaceCurve]]:
         """Return for each level, in their order, the lines of points with that value.
@@ -192,7 +225,7 @@ class ScalarField:
 
     def plot(
         self,
-        isolines: Sequence[float] = (),
+        isolines: int | Sequence[float] = 0,
         paths: Iterable[SurfaceCurve] = (),
         points: Iterable[Point] = (),
         *,
@@ -207,7 +240,7 @@ class ScalarField:
         Parameters
         ----------
         isolines
-            Levels of lines to draw.
+            Levels of lines to draw, or how many, evenly spaced.
         paths, points
             Curves of any kind, and points, to draw as well.
         camera
@@ -223,8 +256,8 @@ class ScalarField:
         MissingExtra
             PyVista is not installed; the extra ``plot`` brings it.
         InvalidArgument
-            The suffix is not that of a picture, the file cannot be written, or there is no such
-            camera.
+            The suffix is not that of a picture, the file cannot be written, there is no such
+            camera, or levels are to be spaced where no two values differ.
 
         Examples
         --------
@@ -232,7 +265,7 @@ class ScalarField:
         >>> from tempfile import mkdtemp
         >>> file = Path(mkdtemp()) / "heights.png"
         >>> mesh = gc.samples.sphere(80)
-        >>> gc.ScalarField(mesh, mesh.vertices[:, 2]).plot([0.0, 0.5], save=file)
+        >>> gc.ScalarField(mesh, mesh.vertices[:, 2]).plot(isolines=5, save=file)
         >>> file.exists()
         True
         """
@@ -241,6 +274,7 @@ class ScalarField:
             surface.point_data["value"] = self.values
             surface.set_active_scalars("value")
             plotting.draw_surface(plotter, surface)
-            lines = [line.to_pyvista() for lines in self.isolines(isolines) for line in lines]
+            levels = drawn_levels(isolines, self.levels)
+            lines = [line.to_pyvista() for lines in self.isolines(levels) for line in lines]
             plotting.draw_lines(plotter, lines, plotting.ISOLINE, plotting.ISOLINE_WIDTH)
             draw_over(self.mesh, plotter, paths, points)

@@ -510,7 +510,10 @@ def test_what_fails_says_why_in_one_line(
         ("locate plane.ply", "--at"),
         ("locate plane.ply --at 1,2", "'1,2' is not a position: write it as x,y,z"),
         ("locate plane.ply --at 1,2,nan", "'1,2,nan' is not a position"),
-        ("distance plane.ply --source 0 --out d.txt", "must end in .npy, .csv, .json or .ply"),
+        (
+            "distance plane.ply --source 0 --out d.txt",
+            "must end in .npy, .csv, .json, .ply or .func.gii",
+        ),
         ("distance plane.ply --source 0 --out no/d.npy", "folder"),
         ("path plane.ply --source 0 --target 1 --out p.ply", ".json or .npy"),
         ("distance plane.ply --source 0 --out d.npy --method heat", "heat"),

@@ -4,6 +4,7 @@ import csv
 import json
 from pathlib import Path
 
+import nibabel
 import numpy as np
 import pytest
 from nibabel.freesurfer import read_morph_data
@@ -96,6 +97,25 @@ def test_values_are_smoothed_as_by_the_library(run: Run):
     told[-1] = "lh.smooth.thickness"
     assert run("cortex", "smooth", f"left={SURFACES[0]}", *told).code == 0
     assert_array_equal(read_morph_data("lh.smooth.thickness"), found)
+
+
+@pytest.mark.usefixtures("region")
+def test_distances_of_one_hemisphere_go_to_gifti(run: Run):
+    ran = run("distance", SURFACES[1], "--source", 5, "--json", "--out", "near.func.gii")
+    assert ran.code == 0
+    expected = gc.exact_distance(gc.load_mesh(SURFACES[1]), 5).distances
+    assert_array_equal(json.loads(ran.out)["distances"], expected)
+    image = nibabel.load("near.func.gii")
+    assert image.meta["AnatomicalStructurePrimary"] == "CortexRight"
+    assert_array_equal(image.darrays[0].data, expected.astype(np.float32))
+
+
+def test_distances_go_to_gifti_where_the_surface_tells_its_side(run: Run):
+    MESHES["right"].to_trimesh().export("surface.off")
+    ran = run("distance", "surface.off", "--source", 5, "--out", "near.func.gii")
+    assert "which hemisphere is surface.off?" in error_line(ran)
+    assert "near.gii must end in" in run("distance", "-", "--source", 5, "--out", "near.gii").err
+    assert (ran.code, list(Path().glob("near*"))) == (1, [])
 
 
 @pytest.mark.parametrize(

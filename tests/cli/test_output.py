@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
+from app.cli import steps
+from app.cli.steps import showing
 from tests.support.commands import Run, error_line
 
 ASKED = {
@@ -220,3 +222,13 @@ def test_shells_complete_commands(run: Run, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setenv("COMP_WORDS", "geodesic pa")
     monkeypatch.setenv("COMP_CWORD", "1")
     assert run().out.split() == ["path", "paths"]
+
+
+def test_steps_show_their_progress_in_logs_now_and_then(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with showing("Working") as step:
+        step.progress(0.25)
+        monkeypatch.setattr(steps, "_LOG_INTERVAL_S", 0.0)
+        step.progress(0.5)
+    assert capsys.readouterr() == ("", "Working: 50%\n")

@@ -324,6 +324,7 @@ def test_methods_are_documented(name: str) -> None:
 def test_help_tells_what_a_method_returns():
     assert signature(Client.job).return_annotation is Job
     assert signature(Client.distances).return_annotation is Distances
+    assert str(signature(Client.job)).startswith("(self, /, job_id: str) -> ")  # for `help`
     assert str(signature(AsyncClient("http://127.0.0.1").job)).startswith("(job_id: str) -> ")
     with pytest.raises(TypeError, match="job is called on a client"):
         Client.job("id")

@@ -178,3 +178,14 @@ def test_other_levels_are_refused(levels: object) -> None:
         field.isolines(levels)  # type: ignore[arg-type]
     with pytest.raises(InvalidPoint, match="point 1"):
         field.at([0, 9])
+
+
+def test_levels_lie_evenly_between_the_lowest_and_the_highest_value() -> None:
+    field = gc.ScalarField(gc.samples.plane(2), [-1.0, np.nan, 3.0, np.inf])
+    assert field.levels(3).tolist() == [0.0, 1.0, 2.0]
+    for count in (0, 1.5, True):
+        with pytest.raises(InvalidArgument, match="an integer, 1 or more"):
+            field.levels(count)  # type: ignore[arg-type]
+    for values in ([2.0] * 4, [np.nan] * 4):
+        with pytest.raises(InvalidArgument, match="no two values differ"):
+            gc.ScalarField(field.mesh, values).levels(1)
