@@ -91,6 +91,13 @@ path of the same length that is straight, or bends at a pseudosource, must take 
 can be traced back.
 """
 
+MISS = 1e-9
+"""Share of an edge's length by which a window may miss a vertex by rounding.
+
+Rays of far pseudosources cross short edges with the rounding of the way: 1e-16 of it, by a hundred
+operations, is up to 1e-10 of an edge that is 1e-4 as long. The path past the window's end is real.
+"""
+
 TIE = 1e-12
 """Relative difference up to which the distances to two sources count as equal.
 

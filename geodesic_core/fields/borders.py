@@ -27,7 +27,7 @@ from geodesic_core.kernels.borders.territories import Territories, divide_faces,
 from geodesic_core.kernels.curves.chains import Chains
 from geodesic_core.kernels.curves.thinning import thin_lines
 from geodesic_core.kernels.front.state import FACE
-from geodesic_core.kernels.mesh.half_edges import TAIL
+from geodesic_core.kernels.mesh.half_edges import LENGTH, TAIL
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.retained.face_windows import FaceWindows, face_windows_of
 from geodesic_core.mesh.surface_curve import SurfaceCurve, curves_of
@@ -150,7 +150,10 @@ class _Drawing:
         labelled = cross_edges(topology, divided, rank)
         parts: list[Arrays] = []
         next_node = len(labelled.sources)
-        near = PIECE * float(swept.distance.max(where=np.isfinite(swept.distance), initial=0.0))
+        # All vertices may be sources: no point of a face is farther than a corner and an edge.
+        edges = topology.geometry[:, LENGTH].reshape(-1, 3)[candidates]
+        farthest = swept.distance.max(where=np.isfinite(swept.distance), initial=0.0) + edges.max()
+        near = PIECE * float(farthest)
 
         def trace(first: int, last: int) -> int:
             nonlocal next_node

@@ -13,7 +13,7 @@ from geodesic_core.kernels.front.window import Window, load_window, straight_dis
 from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import APEX, LENGTH, ROW
 from geodesic_core.kernels.planar import distance
-from geodesic_core.tolerances import BEND, GAP
+from geodesic_core.tolerances import BEND, GAP, MISS
 
 
 @inlined
@@ -29,22 +29,28 @@ def reach_apex(wave: View, h: int, count: int, ax: float, ay: float) -> tuple[in
     They are the window's index; its crossing, where its shortest path to the apex passes the
     half-edge; and its distance, infinite if no window covers the apex: then none beats another for
     sure. Windows whose rays cover the apex go first; only where none does, the two beside it, for a
-    path that bends at the window's end. (To try them all costs a tenth of the sweep and finds
-    nothing more.) Modifies the vertex, and queues it.
+    path that bends at the window's end, and those that miss the apex by no more than rounding. (To
+    try them all costs a tenth of the sweep and finds nothing more.) Modifies the vertex, and queues
+    it.
     """
     mesh, scratch = wave.mesh, wave.pool.scratch
     best, best_source, nearest, crossing = math.inf, 0, -1, 0.0
     last_left, first_right = -1, -1  # beside the apex
     upper = math.inf
-    gap = GAP * mesh.geometry[ROW * h + LENGTH]
+    length = mesh.geometry[ROW * h + LENGTH]
+    gap, miss = GAP * length, MISS * length
     for i in range(count):
         window = load_window(wave, scratch, i)
         x, rise = ray_to(window, ax, ay)
         if x > (window.b1 + gap) * rise:
             last_left = i
+            if x <= (window.b1 + miss) * rise:
+                reach_past_end(wave, h, i, ax, ay)
         elif x < (window.b0 - gap) * rise:
             if first_right < 0:
                 first_right = i
+            if x >= (window.b0 - miss) * rise:
+                reach_past_end(wave, h, i, ax, ay)
         else:
             d, source = straight_distance(window, ax, ay), wave.vertices.source_index[window.root]
             if merging(wave):
@@ -83,6 +89,22 @@ def nearest_bent(
         if d < best:
             nearest, best, crossing = first_right, d, b
     return nearest, best, crossing
+
+
+@kernel
+def reach_past_end(wave: View, h: int, i: int, ax: float, ay: float) -> None:
+    """Reach the apex by a window of scratch that misses it, on a path that bends at its end.
+
+    It may have lost the ray to the apex by rounding, to a window that is farther, but covers it.
+    Modifies the vertex, and queues it.
+    """
+    window, v = load_window(wave, wave.pool.scratch, i), wave.mesh.links[ROW * h + APEX]
+    d, _ = bent_distance(window, ax, ay)
+    if merging(wave):
+        bound_vertex(wave, v, d + window.xi)
+        if wave.mesh.flags[v]:
+            illuminate_vertex(wave, v, d, h, window.sx, window.sy, window.weight)
+    relax_node(wave, v, d * (1.0 + BEND), h, window)
 
 
 @kernel

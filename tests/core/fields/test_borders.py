@@ -175,6 +175,18 @@ def test_ties_along_edges_and_through_vertices(turn):
     assert sum(line.length for line in borders) == pytest.approx(8.0, abs=1e-7)
 
 
+@pytest.mark.parametrize("size", [1.0, 3.0, 10.0])
+def test_borders_where_each_vertex_is_a_source(size):
+    """No vertex is at a distance, and the four territories meet in a point of the diagonal."""
+    square = [[0, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0]]
+    mesh = gc.TriangleMesh(np.array(square) * size, [[3, 1, 0], [3, 0, 2]])
+    field = gc.exact_distance(mesh, [0, 1, 2, 3])
+    borders = field.borders()
+    assert sorted(line.sources for line in borders) == [(0, 1), (0, 2), (1, 3), (2, 3)]
+    assert [line.length for line in borders] == pytest.approx([0.5 * size] * 4, rel=1e-12)
+    assert field.cells().areas == pytest.approx([0.25 * size**2] * 4, rel=1e-12)
+
+
 def test_a_tie_behind_a_corner_has_a_border_around_it():
     """What is equally near to two sources, by one saddle vertex, belongs to the lower one."""
     points, faces = zoo.grid(4, 4)

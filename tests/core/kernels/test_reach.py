@@ -16,7 +16,7 @@ from geodesic_core.kernels.mesh.half_edges import (
     TAIL,
 )
 from geodesic_core.kernels.sweep.reach import reach_apex
-from geodesic_core.tolerances import BEND
+from geodesic_core.tolerances import BEND, GAP, MISS
 from tests.support import zoo
 from tests.support.stepping import flat_view
 
@@ -41,3 +41,29 @@ def test_bend_is_all_that_a_bent_path_is_surcharged(scale):
     assert (nearest, crossing) == (0, end)
     assert bent < wave.vertices.distance[apex] <= bent * (1 + 2 * BEND)
     assert wave.vertices.distance[apex] == pytest.approx(bent * (1 + BEND), rel=2e-16)
+
+
+@pytest.mark.plain
+@zoo.each_scale
+@pytest.mark.parametrize("share", [2 * GAP, 0.5 * MISS, 2 * MISS])
+@pytest.mark.parametrize("nearer", [0, 1])
+def test_miss_is_how_far_beside_a_vertex_a_nearer_window_may_end(scale, share, nearer):
+    """Beside it there is the rest of a farther window, which covers the vertex."""
+    view, wave, h = flat_view(scale)
+    row = view.mesh.geometry[ROW * h : ROW * (h + 1)]
+    ax, ay = row[LENGTH_LEFT] * row[COS_LEFT], row[LENGTH_LEFT] * row[SIN_LEFT]
+    apex, length = view.mesh.links[ROW * h + APEX], row[LENGTH]
+    wave.vertices.distance[apex] = math.inf
+    sx, sy, farther = 0.5 * length, -0.2 * scale, 0.1 * scale
+    to_apex = sx + (ax - sx) * sy / (sy - ay)
+    ends = [0.1 * length, to_apex + (2 * nearer - 1) * share * length, 0.9 * length]
+    for i in range(2):
+        sigma = 0.0 if i == nearer else farther
+        wave.pool.scratch[i, [B0, B1, SX, SY, SIGMA]] = ends[i], ends[i + 1], sx, sy, sigma
+        wave.pool.scratch.view(np.int32)[i, ROOT] = view.mesh.links[ROW * h + TAIL]
+    nearest, crossing, least = reach_apex(view, h, 2, ax, ay)
+    straight = math.hypot(ax - sx, ay - sy)
+    assert (nearest, crossing) == (1 - nearer, pytest.approx(to_apex, rel=1e-12))
+    assert least == pytest.approx(straight + farther, rel=1e-15)
+    expected = straight if share <= MISS else straight + farther
+    assert wave.vertices.distance[apex] == pytest.approx(expected, rel=1e-12)
