@@ -35,7 +35,7 @@ def reach_apex(wave: View, h: int, count: int, ax: float, ay: float) -> tuple[in
     """
     mesh, scratch = wave.mesh, wave.pool.scratch
     best, best_source, nearest, crossing = math.inf, 0, -1, 0.0
-    last_left, first_right = -1, -1  # beside the apex
+    last_left, first_right, is_missed = -1, -1, False  # beside the apex
     upper = math.inf
     length = mesh.geometry[ROW * h + LENGTH]
     gap, miss = GAP * length, MISS * length
@@ -44,13 +44,11 @@ def reach_apex(wave: View, h: int, count: int, ax: float, ay: float) -> tuple[in
         x, rise = ray_to(window, ax, ay)
         if x > (window.b1 + gap) * rise:
             last_left = i
-            if x <= (window.b1 + miss) * rise:
-                reach_past_end(wave, h, i, ax, ay)
+            is_missed |= x <= (window.b1 + miss) * rise
         elif x < (window.b0 - gap) * rise:
             if first_right < 0:
                 first_right = i
-            if x >= (window.b0 - miss) * rise:
-                reach_past_end(wave, h, i, ax, ay)
+            is_missed |= x >= (window.b0 - miss) * rise
         else:
             d, source = straight_distance(window, ax, ay), wave.vertices.source_index[window.root]
             if merging(wave):
@@ -68,6 +66,8 @@ def reach_apex(wave: View, h: int, count: int, ax: float, ay: float) -> tuple[in
             illuminate_apex(wave, h, count, nearest, ax, ay, best)
     surcharge = 1.0 if is_covered else 1.0 + BEND
     relax_node(wave, v, best * surcharge, h, window)
+    if is_missed:
+        reach_past_ends(wave, h, count, ax, ay)
     return nearest, crossing, best if is_covered else math.inf
 
 
@@ -92,19 +92,23 @@ def nearest_bent(
 
 
 @kernel
-def reach_past_end(wave: View, h: int, i: int, ax: float, ay: float) -> None:
-    """Reach the apex by a window of scratch that misses it, on a path that bends at its end.
+def reach_past_ends(wave: View, h: int, count: int, ax: float, ay: float) -> None:
+    """Reach the apex by the windows of scratch that just miss it, on paths that bend at their ends.
 
-    It may have lost the ray to the apex by rounding, to a window that is farther, but covers it.
+    They may have lost the ray to it by rounding, to a window that is farther, but covers it.
     Modifies the vertex, and queues it.
     """
-    window, v = load_window(wave, wave.pool.scratch, i), wave.mesh.links[ROW * h + APEX]
-    d, _ = bent_distance(window, ax, ay)
-    if merging(wave):
-        bound_vertex(wave, v, d + window.xi)
-        if wave.mesh.flags[v]:
-            illuminate_vertex(wave, v, d, h, window.sx, window.sy, window.weight)
-    relax_node(wave, v, d * (1.0 + BEND), h, window)
+    v, miss = wave.mesh.links[ROW * h + APEX], MISS * wave.mesh.geometry[ROW * h + LENGTH]
+    for i in range(count):
+        window = load_window(wave, wave.pool.scratch, i)
+        x, rise = ray_to(window, ax, ay)
+        if 0.0 < max(x - window.b1 * rise, window.b0 * rise - x) <= miss * rise:
+            d, _ = bent_distance(window, ax, ay)
+            if merging(wave):
+                bound_vertex(wave, v, d + window.xi)
+                if wave.mesh.flags[v]:
+                    illuminate_vertex(wave, v, d, h, window.sx, window.sy, window.weight)
+            relax_node(wave, v, d * (1.0 + BEND), h, window)
 
 
 @kernel
