@@ -561,9 +561,10 @@ def prove(
         lower = lower - 4 * U * np.abs(lower)
     lower = np.where(is_reached, lower, np.inf)[surface.label]
     lower = np.maximum(lower, min(source.start for source in sources))
-    for source in sources:  # a source may be a vertex of no face
-        if source.vertex >= 0 and np.isinf(lower[source.vertex]):
-            lower[source.vertex] = source.start
+    for source in sorted(sources, key=lambda each: each.start):  # may be at a vertex of no face
+        if source.vertex >= 0:
+            is_here = surface.label == surface.label[source.vertex]
+            lower[is_here & np.isinf(lower)] = source.start
     refuse_unless(not np.isnan(lower).any() and not np.isnan(tau).any(), "a bound is no number")
     by_face = np.zeros(len(surface.given))
     by_face[surface.kept] = tau

@@ -538,3 +538,15 @@ def test_certified():
     """Bounds that differ by more prove no field, those of exact fields differ by far less."""
     certificate = gc.exact_distance(gc.samples.knot(500), 0).certify()
     assert certificate.relative_gap < 1e-2 * CERTIFIED
+
+
+@pytest.mark.parametrize("sources", [[3], [gc.Source(3, 2.0), gc.Source(3, 1.0)], [6], [0, 4]])
+def test_sources_of_a_place_without_faces(sources):
+    """A face whose corners are one place is none; a start distance counts there as elsewhere."""
+    points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], *[[5, 5, 5]] * 3, [9, 9, 9]]
+    mesh = gc.TriangleMesh(points, [[0, 1, 2], [3, 4, 5]])
+    field = gc.exact_distance(mesh, sources)
+    certificate = field.certify()
+    assert certificate.holds
+    assert (certificate.lower <= field.distances).all()
+    assert certificate.upper.tolist() == pytest.approx(field.distances.tolist(), rel=1e-9)
