@@ -35,7 +35,7 @@ myst_heading_anchors = 4
 napoleon_google_docstring = False
 napoleon_use_ivar = True
 autodoc_typehints = "none"  # the signature and the docstring have them
-autodoc_preserve_defaults = True
+autodoc_preserve_defaults = True  # progress=ignore_progress, not its address in memory
 autodoc_member_order = "bysource"
 
 

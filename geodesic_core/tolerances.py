@@ -94,8 +94,8 @@ can be traced back.
 MISS = 1e-9
 """Share of an edge's length by which a window may miss a vertex by rounding.
 
-Rays of far pseudosources cross short edges with the rounding of the way: 1e-16 of it, by a hundred
-operations, is up to 1e-10 of an edge that is 1e-4 as long. The path past the window's end is real.
+A ray rounds by about 1e-14 of its length, which is 1e-10 of an edge 1e-4 as long. A larger bound
+would do no harm, since paths past the window's end are real; it would only cost time.
 """
 
 TIE = 1e-12

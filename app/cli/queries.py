@@ -196,8 +196,6 @@ def _write_metric(path: Path, surface: Path, distances: "Floats") -> None:
     """Write the distances of a hemisphere, whose side the file of its surface tells."""
     from geodesic_core.brain import load_cortex, write_maps
 
-    if surface == STANDARD_STREAM:
-        raise Failure(f"{path} tells its hemisphere, and standard input does not: give a file")
     with writing(path):
         write_maps(path, load_cortex(surface), distances, ["distance"])
 
@@ -863,11 +861,14 @@ def _run(command: Command, given: dict[str, Any]) -> None:
     if command.kind == "locate":
         points["points"] = [points["points"]]
     mesh = MeshInput(given["mesh_file"], given["file_format"], given["merge"])
+    is_metric = output.out is not None and output.out.suffix.lower() == ".gii"
+    if is_metric and mesh.file == STANDARD_STREAM:
+        raise Failure(f"standard input does not tell the hemisphere for {output.out}: give a file")
     answered = ask(command.kind, mesh, command.label, points, members)
     found = answered.answer.members
     if found.get("status") == "no_path":
         raise Failure(_NO_PATH[found["reason"]].format(limit=given["max_distance"]))
-    if output.out is not None and output.out.suffix.lower() == ".gii":
+    if output.out is not None and is_metric:
         _write_metric(output.out, mesh.file, found["distances"])
         Output(None, output.as_json).write(answered.answer)
     else:

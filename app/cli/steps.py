@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 _LOG_INTERVAL_S = 60.0
-"""Between lines about a step whose standard error is no terminal"""
+"""Seconds between lines of progress where standard error is not a terminal"""
 
 
 class Failure(Exception):  # noqa: N818 - not an error of this program

@@ -160,9 +160,9 @@ class Database:
 
 
 class _SelfClosing(sqlite3.Connection):
-    """Closes itself where nothing refers to it any more.
+    """A connection that closes once nothing refers to it.
 
-    Where a request is cancelled while its connection opens, aiosqlite forgets what it opened.
+    If a request is cancelled while its connection opens, aiosqlite drops the connection unclosed.
     """
 
     def __del__(self) -> None:

@@ -150,7 +150,7 @@ class _Drawing:
         labelled = cross_edges(topology, divided, rank)
         parts: list[Arrays] = []
         next_node = len(labelled.sources)
-        # All vertices may be sources: no point of a face is farther than a corner and an edge.
+        # Corners may all be sources, at distance 0; points of a face are at most an edge farther.
         edges = topology.geometry[:, LENGTH].reshape(-1, 3)[candidates]
         farthest = swept.distance.max(where=np.isfinite(swept.distance), initial=0.0) + edges.max()
         near = PIECE * float(farthest)

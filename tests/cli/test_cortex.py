@@ -114,6 +114,8 @@ def test_distances_go_to_gifti_where_the_surface_tells_its_side(run: Run):
     MESHES["right"].to_trimesh().export("surface.off")
     ran = run("distance", "surface.off", "--source", 5, "--out", "near.func.gii")
     assert "which hemisphere is surface.off?" in error_line(ran)
+    piped = run("distance", "-", "--format", "off", "--source", 5, "--out", "near.func.gii")
+    assert "standard input does not tell the hemisphere for near.func.gii" in error_line(piped)
     assert "near.gii must end in" in run("distance", "-", "--source", 5, "--out", "near.gii").err
     assert (ran.code, list(Path().glob("near*"))) == (1, [])
 

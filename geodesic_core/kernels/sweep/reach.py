@@ -29,9 +29,9 @@ def reach_apex(wave: View, h: int, count: int, ax: float, ay: float) -> tuple[in
     They are the window's index; its crossing, where its shortest path to the apex passes the
     half-edge; and its distance, infinite if no window covers the apex: then none beats another for
     sure. Windows whose rays cover the apex go first; only where none does, the two beside it, for a
-    path that bends at the window's end, and those that miss the apex by no more than rounding. (To
-    try them all costs a tenth of the sweep and finds nothing more.) Modifies the vertex, and queues
-    it.
+    path that bends at the window's end. Windows that miss the apex by rounding are tried in any
+    case. (To try all of them costs a tenth of the sweep and finds nothing more.) Modifies the
+    vertex, and queues it.
     """
     mesh, scratch = wave.mesh, wave.pool.scratch
     best, best_source, nearest, crossing = math.inf, 0, -1, 0.0
@@ -95,7 +95,7 @@ def nearest_bent(
 def reach_past_ends(wave: View, h: int, count: int, ax: float, ay: float) -> None:
     """Reach the apex by the windows of scratch that just miss it, on paths that bend at their ends.
 
-    They may have lost the ray to it by rounding, to a window that is farther, but covers it.
+    Rounding may have left the ray to it to a window that is farther away.
     Modifies the vertex, and queues it.
     """
     v, miss = wave.mesh.links[ROW * h + APEX], MISS * wave.mesh.geometry[ROW * h + LENGTH]
